@@ -34,7 +34,7 @@ from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, plain, style
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import box_corners
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
@@ -60,7 +60,7 @@ def vault(_: Engine) -> Figure:
         panel.set_title(name, loc="center")
     draw_bricks(plan, net, 338, View(azimuth=0, elevation=90), marked=arch)
     plan.set_title("from above, in mm", loc="center")
-    corner = boxes(net.scene.bricks).corners().reshape(-1, 3)
+    corner = box_corners(net.scene.bricks).reshape(-1, 3)
     (left, front, _), (right, back, _) = corner.min(axis=0), corner.max(axis=0)
     plan.add_patch(Rectangle((left, front), right - left, back - front, fill=False, ls=":"))
     text = {"ha": "center", "va": "center"}

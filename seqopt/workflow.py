@@ -20,7 +20,7 @@ from seqopt.graph.formulation import Formulation, Run, as_formulation, find_form
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of, in_layers, pose
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import _solve_run
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter, parse_limits
@@ -390,7 +390,7 @@ def _chooses_states(
 ) -> bool:
     """Return whether states are chosen, not candidates; ``others``: options that need states."""
     filtered = any(isinstance(each, Filter) for each in limits)
-    if any(others) or filtered or not in_layers(moves):
+    if any(others) or filtered or not moves.has_pairs:
         return True
     return formulation is not None and find_formulation(formulation).of_states
 

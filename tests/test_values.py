@@ -27,7 +27,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.scene.arm import HeldPostures
-from seqopt.scene.boxes import _faces, boxes
+from seqopt.scene.boxes import _faces
 from seqopt.scene.shape import Surface
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
@@ -50,12 +50,10 @@ def values(arch25):
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, seqopt.EPOXY))
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
-    shapes = boxes(arch25.bricks)
     cube = box((1, 1, 1))
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),
-        shapes,
         *_faces(np.array(cube.vertices), cube),
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),

@@ -34,7 +34,6 @@ from seqopt.graph.states._visits import seen_steps
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.sequence._rule_space import node_numbers
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._fall_cuts import FallCuts
 from seqopt.times._graph import timed_graph
@@ -94,7 +93,7 @@ class Waits:
             *([*kind], waits),
             begin=problem.rules.begin,
         )
-        place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
+        place = {node: i for i, node in enumerate(space.network.scene.placed_nodes, start=1)}
         grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
         times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
         starts = () if waits is None else tuple(time.start for time in times)

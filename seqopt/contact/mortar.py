@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 from seqopt.arrays import Terse
 from seqopt.errors import SceneError, did_you_mean
-from seqopt.scene._checks import check, finite, not_negative, rows, settle, short
+from seqopt.scene._checks import check, finite, not_negative, positive, rows, settle, short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,6 +223,5 @@ class BedStiffness:
     tangential: float
 
     def __post_init__(self) -> None:
-        for name in ("normal", "tangential"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")
+        each = partial(positive, unit="N/m³")
+        check(self, "bed", normal=each, tangential=each)

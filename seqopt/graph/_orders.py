@@ -16,7 +16,7 @@ from seqopt.graph.states._visits import StateSpace, move_amounts, scenario_peaks
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Orders
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._rule_space import node_numbers, sort_entries
+from seqopt.sequence._rule_space import sort_entries
 
 MOST_PARTS = 5000  # sets of bricks with a newest one, where all are looked at
 
@@ -226,8 +226,8 @@ class OrderSpace(Space):
 
 def _renumbered(old: States, new: States, states: Ints) -> Ints:
     """Return states with the places that nodes have in another order."""
-    place = {node: i for i, node in enumerate(node_numbers(new.network), start=1)}
-    map_to = np.array([0, *(place[node] for node in node_numbers(old.network))])
+    place = {node: i for i, node in enumerate(new.network.scene.placed_nodes, start=1)}
+    map_to = np.array([0, *(place[node] for node in old.network.scene.placed_nodes)])
     out, robots = states.copy(), old.space.robots
     nodes = states[:, :robots]  # negative where a free robot was last
     out[:, :robots] = np.sign(nodes) * map_to[np.abs(nodes)]

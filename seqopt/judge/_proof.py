@@ -41,7 +41,6 @@ from seqopt.problem.amounts import NONE
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._rule_check import RuleBook
-from seqopt.sequence._rule_space import node_numbers
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
@@ -405,7 +404,7 @@ def as_rows(problem: States, evaluator: StateEvaluator, hint: Hint) -> dict[int,
     Raises `SolverError` if a row is no state: it has too few numbers, or names no node.
     """
     tables, order = evaluator.tables, _own_columns(problem, evaluator)
-    width, nodes = tables.start().shape[1], len(node_numbers(problem.network))
+    width, nodes = tables.start().shape[1], len(problem.network.scene.placed_nodes)
     out = {}
     for level, rows in hint.items():
         if rows.shape[1] != width or (np.abs(rows[:, : len(order)]) > nodes).any():

@@ -75,15 +75,6 @@ def spring_stiffness(network: Network, which: Ints) -> Floats:
     return stiffness
 
 
-def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
-    """Return which springs act (s,), their `deformation` (s, 6, 6b) and stiffness (s, 6, 6)."""
-    springs, center = network.springs, network.centroid[:bricks]
-    acting = springs.acting(bricks)
-    gap = deformation(springs.bodies[acting], springs.position[acting], center)
-    gaps = gap.toarray().reshape(len(acting), 6, 6 * bricks)
-    return acting, gaps, spring_stiffness(network, acting)
-
-
 def spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sparse.csr_array:
     """Return the sparse matrix of blocks (m, p, q) at block rows and columns (m,)."""
     down, across = block.shape[1:]

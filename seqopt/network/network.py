@@ -7,7 +7,6 @@ fixed base node. So the parts of a partial structure come first in every array.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -250,11 +249,6 @@ class Network(Shown, FrozenValue):
         return frozen(units(step))
 
     @cached_property
-    def index_of_node(self) -> dict[int, int]:
-        """Index of every inner node by its number in the scene."""
-        return {name: i for i, name in enumerate(self.node_name) if isinstance(name, int)}
-
-    @cached_property
     def derived(self) -> dict[str, Any]:
         """Values that outer rooms derive from the network alone and cache with it, by name."""
         return {}
@@ -305,23 +299,6 @@ class Network(Shown, FrozenValue):
         """Draw the network, or its part of the first ``bricks``, in build order."""
         figure: Figure = display(Network, "plot")(self, bricks)
         return figure
-
-    def graph(self, bricks: int) -> nx.Graph[object]:
-        """Return a partial structure as a graph.
-
-        Nodes have a ``kind`` (`PartKind`), ``since``, the brick count that brings them, and a
-        ``position``, m; edges a ``kind``, ``since``, their ``number`` and ``length``, m.
-        """
-        out: nx.Graph[object] = nx.Graph(name=self.scene.name)
-        for i, name in enumerate(self.node_name[: self.count_nodes(bricks)]):
-            own = {"kind": PartKind(self.node_kind[i]), "since": int(self.node_since[i])}
-            out.add_node(name, **own, position=tuple(self.node_position[i].tolist()))
-        for e, (a, b) in enumerate(self.edge_nodes[: self.count_edges(bricks)].tolist()):
-            own = {"kind": PartKind(self.edge_kind[e]), "since": int(self.edge_since[e])}
-            length = math.dist(self.node_position[a], self.node_position[b])
-            out.add_edge(self.node_name[a], self.node_name[b], number=e + 1, length=length, **own)
-        found: nx.Graph[object] = nx.freeze(out)
-        return found
 
     def bodies(self, bricks: int) -> nx.Graph[int]:
         """Return the graph of bricks and ground of a partial structure, connected by springs.

@@ -91,12 +91,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
 def chooses_moves(problem: Problem) -> bool:
     """Return whether candidates of moves are chosen by default, as the formulation minimizes."""
     beside = problem.filters or problem.paths or problem.stands is not None or problem.orders
-    return in_layers(problem.moves) and not (problem.is_timed or problem.goals or beside)
-
-
-def in_layers(moves: Schedule | FreeRules) -> bool:
-    """Return whether steps have at most two open grips, so that candidates form layers."""
-    return getattr(moves, "has_pairs", True)
+    return problem.moves.has_pairs and not (problem.is_timed or problem.goals or beside)
 
 
 def graph_of(problem: Problem, *, moves: bool | None = None) -> States:

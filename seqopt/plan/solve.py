@@ -31,7 +31,7 @@ from seqopt.graph.states.states import States, of_decisions
 from seqopt.judge._step_checks import check_shape
 from seqopt.plan._answers import Found, find_path, require_fit, require_time
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import AIMS, chooses_moves, graph_of, in_layers
+from seqopt.plan.pose import AIMS, chooses_moves, graph_of
 from seqopt.problem.amounts import Amount
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE
@@ -147,7 +147,7 @@ def _fitting(problem: Problem, formulation: Formulation) -> tuple[bool, Formulat
         return False, formulation
     asked: dict[tuple[Amount, ...], Aim | None] = {(goal,): each for each, goal in AIMS.items()}
     asked[()] = aim  # its own, where none is asked
-    could = in_layers(problem.moves) and problem.goals in asked
+    could = problem.moves.has_pairs and problem.goals in asked
     could &= not (problem.is_timed or problem.orders)
     if aim is None or not (moves or could):
         return moves, formulation

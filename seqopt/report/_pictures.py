@@ -31,7 +31,7 @@ from seqopt.report.draw import (
 )
 from seqopt.responses.table import step_fields
 from seqopt.scene._checks import short
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import box_corners
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind
 
@@ -57,7 +57,7 @@ def _panels(box: Box, count: int, width: float, room: float) -> tuple[Figure, li
 
 def _seen_box(scene: Scene) -> Box:
     """Return the view of a structure, with a margin."""
-    seen = boxes(scene.placed).corners().reshape(-1, 3) @ VIEW.axes()[:2].T
+    seen = box_corners(scene.placed).reshape(-1, 3) @ VIEW.axes()[:2].T
     room = 0.06 * np.ptp(seen, axis=0).max()
     return np.asarray(seen.min(axis=0) - room), np.asarray(seen.max(axis=0) + room)
 

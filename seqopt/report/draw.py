@@ -29,7 +29,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
-from seqopt.scene.boxes import boxes, vertices_of
+from seqopt.scene.boxes import box_corners, vertices_of
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
@@ -216,7 +216,7 @@ def draw_bricks(  # what is drawn, and how, each by its name
         shift, turn = np.split(motion[b], 2)
         return np.asarray(points + shift + np.cross(turn, points - placed[b].position))
 
-    boxed = np.array([moved(b, corners) for b, corners in enumerate(boxes(placed).corners())])
+    boxed = np.array([moved(b, corners) for b, corners in enumerate(box_corners(placed))])
     polygons, colors = [], []
     for b in _drawing_order(boxed, toward):
         brick, (points, faces) = placed[b], vertices_of(placed[b])

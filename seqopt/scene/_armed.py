@@ -86,14 +86,6 @@ def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
     return out
 
 
-def can_hold(scene: Scene, kind: int, node: int) -> bool:
-    """Return whether the compliance of grips of a kind is known at a node."""
-    held = scene.held_postures
-    if held is None or not scene.grip_kinds.arms[kind]:
-        return True
-    return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
-
-
 class _NoRules:
     """Which states arms can be in, by a second way for the judge: all, of robots without any."""
 

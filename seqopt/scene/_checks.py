@@ -110,7 +110,7 @@ def printable(where: str, value: str) -> str:
     return value
 
 
-_UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
+UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 
 
 def unit_axes(value: object, where: str, first: str, second: str) -> None:
@@ -120,7 +120,7 @@ def unit_axes(value: object, where: str, first: str, second: str) -> None:
     size, other, cosine = (
         math.fsum(x * y for x, y in zip(*pair, strict=True)) for pair in ((a, a), (b, b), (a, b))
     )
-    if max(abs(size - 1), abs(other - 1), abs(cosine)) > _UNIT:
+    if max(abs(size - 1), abs(other - 1), abs(cosine)) > UNIT:
         raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
     settle(value, **{first: a, second: b})
 

@@ -79,11 +79,6 @@ class ArchShape(Terse):
         """How each brick lies."""
         return (self.pattern * len(self.pitch))[: len(self.pitch)]
 
-    @property
-    def thickness(self) -> float | None:
-        """The width of a joint, m, where it is so thick that a joint must say so."""
-        return self.gap if self.gap > THICKEST * min(self.dimensions) else None
-
     def __post_init__(self) -> None:
         check(self, "arch", pitch=_numbers, roll=_numbers, yaw=_numbers, offset=_numbers)
         check(self, "arch", pattern=letters, gap=finite, overhang=finite, stub=finite)
@@ -141,10 +136,12 @@ def arch_scene(
     tangent, left, ends = _axes(shape)
     stiffness = shape.translational_stiffness, shape.rotational_stiffness
 
+    thickness = shape.gap if shape.gap > THICKEST * min(shape.dimensions) else None
+
     def spring(place: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
         rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
         fields = _spring_fields(place, along, rest / np.linalg.norm(rest), stiffness)
-        return {**fields, "thickness": shape.thickness}
+        return {**fields, "thickness": thickness}
 
     def ground(brick: int, at: int, sign: float) -> Ground:
         anchor = as_vector(ends[at] + sign * shape.stub * tangent[at])

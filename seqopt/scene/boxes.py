@@ -18,7 +18,7 @@ import numpy as np
 from seqopt._later import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import frames, short, units, whole
+from seqopt.scene._checks import short, units, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
@@ -89,28 +89,17 @@ _PARALLEL = 1e-9  # sine of an angle between edges treated as zero
 _DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Boxes(FrozenValue):
-    """Where bricks are and how large, as arrays."""
-
-    place: Floats  # (n, 3); centroids, m
-    frame: Floats  # (n, 3, 3); rows are unit vectors along length, width and thickness
-    half: Floats  # (n, 3); half of each dimension, m
-
-    def corners(self) -> Floats:
-        """Return where the corners are, (n, 8, 3), m."""
-        return np.asarray(self.place[:, None] + (BOX_CORNERS * self.half[:, None]) @ self.frame)
+def _boxes(bricks: Sequence[Brick]) -> tuple[Floats, Floats, Floats]:
+    """Return centroids (n, 3), frames (n, 3, 3) and halves of dimensions (n, 3) of bricks, m."""
+    place = np.array([brick.position for brick in bricks]).reshape(-1, 3)
+    frame = np.array([brick.frame for brick in bricks]).reshape(-1, 3, 3)
+    return place, frame, 0.5 * np.array([brick.dimensions for brick in bricks]).reshape(-1, 3)
 
 
-def boxes(bricks: Sequence[Brick]) -> Boxes:
-    """Return bricks as boxes."""
-    length = np.array([brick.length_axis for brick in bricks]).reshape(-1, 3)
-    width = np.array([brick.width_axis for brick in bricks]).reshape(-1, 3)
-    return Boxes(
-        place=np.array([brick.position for brick in bricks]).reshape(-1, 3),
-        frame=frames(length, width),
-        half=0.5 * np.array([brick.dimensions for brick in bricks]).reshape(-1, 3),
-    )
+def box_corners(bricks: Sequence[Brick]) -> Floats:
+    """Return where the corners of bricks are, each as a box, (n, 8, 3), m."""
+    place, frame, half = _boxes(bricks)
+    return np.asarray(place[:, None] + (BOX_CORNERS * half[:, None]) @ frame)
 
 
 def _separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
@@ -119,21 +108,20 @@ def _separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     Along the direction in which they are farthest apart: at most their distance, negative where
     they interpenetrate.
     """
-    shapes = boxes(bricks)
-    longest = 2 * float(np.linalg.norm(shapes.half, axis=1).max(initial=0.0))
-    near = spatial.KDTree(shapes.place).query_pairs(longest, output_type="ndarray")
+    place, frame, half = _boxes(bricks)
+    longest = 2 * float(np.linalg.norm(half, axis=1).max(initial=0.0))
+    near = spatial.KDTree(place).query_pairs(longest, output_type="ndarray")
     pairs = near[np.lexsort(near.T[::-1])].astype(np.int64)
     a, b = pairs.T
-    first, second = shapes.frame[a], shapes.frame[b]
+    first, second = frame[a], frame[b]
     normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
     size = np.linalg.norm(normal, axis=2, keepdims=True)
     normal = np.where(size > _PARALLEL, normal / np.maximum(size, _PARALLEL), 0.0)
     axes = np.concatenate([first, second, normal], axis=1)
-    step = shapes.place[b] - shapes.place[a]
-    apart = np.abs(axes @ step[:, :, None])[:, :, 0]
+    apart = np.abs(axes @ (place[b] - place[a])[:, :, None])[:, :, 0]
     for which in (a, b):
-        spread = np.abs(axes @ shapes.frame[which].transpose(0, 2, 1))
-        apart -= (spread @ shapes.half[which][:, :, None])[:, :, 0]
+        spread = np.abs(axes @ frame[which].transpose(0, 2, 1))
+        apart -= (spread @ half[which][:, :, None])[:, :, 0]
     real = np.linalg.norm(axes, axis=2) > _PARALLEL
     return pairs, np.where(real, apart, -np.inf).max(axis=1, initial=-np.inf)
 

@@ -18,6 +18,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
+    UNIT,
     as_float,
     check,
     density,
@@ -82,7 +83,6 @@ class Load(Terse):
         return self.brick if self.since is None else self.since
 
 
-_UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
@@ -134,7 +134,7 @@ class Side:
 
     def __post_init__(self) -> None:
         check(self, "reach", toward=vector, point=vector)
-        if abs(math.fsum(x * x for x in self.toward) - 1) > _UNIT:
+        if abs(math.fsum(x * x for x in self.toward) - 1) > UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
     def covers(self, point: Vector) -> bool:

@@ -19,7 +19,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, SceneError
 from seqopt.scene._checks import short, whole_between
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.parts import Brick, Ground, Joint, Load
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
 _Part = TypeVar("_Part", Brick, Joint, Ground, Load)
@@ -42,17 +42,6 @@ def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene
     ]
     joints = len(scene.joints)
     return replace(scene, joints=tuple(out[:joints]), grounds=tuple(out[joints:]))
-
-
-def _regripped(scene: Scene, factors: Floats) -> Scene:
-    """Return a scene whose grips are stiffer by factors (K,), by kind, with the joints of arms."""
-    robots = []
-    for robot, kind in zip(scene.robots, scene.grip_kinds.of_robot, strict=False):  # props follow
-        factor = float(factors[kind])
-        arm = robot.arm and _stiffer(robot.arm, joint_stiffness=factor)
-        grip = _stiffer(robot, stiffness=factor, rotational_stiffness=factor)
-        robots.append(replace(grip, arm=arm))
-    return scene.with_robots(*robots)
 
 
 def weighed(scene: Scene, factors: Floats) -> Scene:
@@ -220,11 +209,17 @@ def _sample(of: Scenarios, number: int) -> Scene:
     stiff, heavy, moved, held = (np.random.default_rng([of.seed, number, k]) for k in range(4))
     (low, high), (least, most) = (map(math.log, ends) for ends in (of.stiffness, of.grips))
     logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
-    grips = held.uniform(least, most, len(scene.grip_kinds.turns))
+    grips, robots = np.exp(held.uniform(least, most, len(scene.grip_kinds.turns))), list[Robot]()
+    kinds = scene.grip_kinds.of_robot if least < most else ()
+    for robot, kind in zip(scene.robots, kinds, strict=False):  # props follow
+        factor = float(grips[kind])
+        arm = robot.arm and _stiffer(robot.arm, joint_stiffness=factor)
+        grip = _stiffer(robot, stiffness=factor, rotational_stiffness=factor)
+        robots.append(replace(grip, arm=arm))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
         out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + of.density * shares)
-        out = _regripped(out, np.exp(grips)) if least < most else out
+        out = out.with_robots(*robots) if robots else out
         return shifted(out, of.position, moved) if of.position else out
     except SceneError as error:
         raise SceneError(

@@ -228,7 +228,8 @@ class Scene(Shown):
 
         Nodes that are blocked, or held by props, are not among them.
         """
-        known = self._within_reach
+        known: dict[Reach, tuple[tuple[int, ...], ...]]
+        known = self.__dict__.setdefault("reached", {})
         if robot.reach not in known:
             covers = robot.reach.covers
             blocked = {*self.blocked_nodes, *(prop.node for prop in self.props)}
@@ -237,10 +238,6 @@ class Scene(Shown):
                 for b in self.placed
             )
         return known[robot.reach]
-
-    @cached_property
-    def _within_reach(self) -> dict[Reach, tuple[tuple[int, ...], ...]]:
-        return {}
 
     @property
     def arms(self) -> tuple[Arm | None, ...]:

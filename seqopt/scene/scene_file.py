@@ -193,8 +193,7 @@ def load_scene(name: str | Path) -> Scene:
         raise SceneError(f"a {type(name).__name__} is not a name of a scene; give text or a path")
     name = str(name)
     if name in builtin_scenes():
-        text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
-        return _scene_from_dict(json.loads(text))
+        return _parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
     kind, colon, _ = name.partition(":")
     if colon and kind in KINDS:
         return _scene_by_words(name)
@@ -236,13 +235,8 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
             raise SceneError(f"scene {source}: {what}; keep one")
         return dict(pairs)
 
-    document = parse_json(text, f"scene {source}", SceneError, object_pairs_hook=entries)
-    return _scene_from_dict(document, f"scene {source}")
-
-
-def _scene_from_dict(document: Any, where: str = "scene") -> Scene:
-    """Return the scene of a document; ``where``: named in messages."""
-    content = dict(document) if isinstance(document, dict) else document
+    where = f"scene {source}"
+    content = parse_json(text, where, SceneError, object_pairs_hook=entries)
     for key, wanted in _HEADER.items() if isinstance(content, dict) else ():
         if (given := content.pop(key, None)) != wanted:
             raise SceneError(f"{where}: {key} is {short(given)}; give {wanted!r}")

@@ -73,11 +73,6 @@ def sort_robots(
     return tuple(alike.values())
 
 
-def node_numbers(network: Network) -> list[int]:
-    """Return the scene's numbers of all inner nodes (2B,), brick by brick in build order."""
-    return [*network.scene.placed_nodes]
-
-
 class Moves(NamedTuple):
     """Moves from states of one brick count."""
 
@@ -132,7 +127,7 @@ class StateRows(Terse):
     @cached_property
     def _place(self) -> dict[int | None, int]:
         """The places of nodes in build order, from 1."""
-        return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
+        return {node: i for i, node in enumerate(self.network.scene.placed_nodes, start=1)}
 
     @cached_property
     def _at(self) -> Floats:
@@ -224,8 +219,11 @@ class FreeSpace(StateRows):
         return (releases, (self._holds(bricks, states), True)) if regrips else (releases,)
 
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
-        """Return the moves that place the next brick: none of them is a regrip."""
-        return ((self.places(level, states), False),)
+        """Return the moves that place the next brick; a free robot then holds it: no regrips."""
+        nodes = np.array([2 * level, 2 * level + 1])
+        moves = self._takes(states, [nodes[k.newest[nodes] & k.places[level]] for k in self.kinds])
+        moves.states[:, self.robots :] = 0
+        return ((self._lawful_only(level + 1, moves), False),)
 
     def start(self) -> Ints:
         """Return the initial state, (1, c).
@@ -257,13 +255,6 @@ class FreeSpace(StateRows):
         if self.rules.begin is None or bricks != self._span[0] or not bricks:
             return np.ones(len(states), dtype=bool)
         return self.lawful(bricks, states)
-
-    def places(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves that place the next brick; a free robot then holds it."""
-        nodes = np.array([2 * bricks, 2 * bricks + 1])
-        moves = self._takes(states, [nodes[k.newest[nodes] & k.places[bricks]] for k in self.kinds])
-        moves.states[:, self.robots :] = 0
-        return self._lawful_only(bricks + 1, moves)
 
     def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
@@ -355,7 +346,7 @@ class FreeSpace(StateRows):
         ``states``: as of a `seqopt.graph.formulation.Solution`. Raises `SolverError` if they are
         none of this space; `StepError` if no single step leads from one to the next.
         """
-        numbers = [None, *node_numbers(self.network)]
+        numbers = [None, *self.network.scene.placed_nodes]
         begin = _begin_step(self.network.scene, self.rules.begin)
         grips: list[int | None] = [*begin.grips]
         lasts = (begin.grips, self.rules.begin.stays) if self.rules.begin else ()

@@ -1,4 +1,4 @@
-"""States of a schedule's open grips, a level for every step; and the builders of both spaces."""
+"""States of a schedule's open grips, a level for every step."""
 
 from __future__ import annotations
 
@@ -13,15 +13,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_space import (
-    FreeSpace,
-    Moves,
-    RobotKind,
-    StateRows,
-    free_space,
-    node_numbers,
-)
-from seqopt.sequence.rules import FreeRules
+from seqopt.sequence._rule_space import Moves, RobotKind, StateRows
 from seqopt.sequence.schedule import OpenGrip, Schedule, can_carry, carried
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
@@ -133,28 +125,10 @@ class ScheduleSpace(StateRows):
             raise SolverError("the states are none of this schedule: it has one for every step")
         if np.abs(rows).max() > 2 * len(self.network.inner):
             raise SolverError("a state of a schedule holds a node that does not exist")
-        numbers = np.array([None, *node_numbers(self.network)])
+        numbers = np.array([None, *self.network.scene.placed_nodes])
         grips = numbers[rows.clip(min=0)].tolist()
         steps = [
             Step(s.number, s.kind, s.bricks, tuple(nodes))
             for s, nodes in zip(self.rules.steps, grips, strict=True)
         ]
         return check_sequence(self.network.scene, steps)
-
-
-def _space_of(
-    rules: FreeRules | Schedule,
-    network: Network,
-    caps: Mapping[str, float],
-    *,
-    parks: bool,
-    timed: bool,
-    worlds: tuple[Scene, ...],
-) -> FreeSpace | ScheduleSpace:
-    """Return the states that rules allow, or that fill a schedule's open grips: see `free_space`.
-
-    Who has a space asks nobody which one it is.
-    """
-    if isinstance(rules, FreeRules):
-        return free_space(network, rules, caps, parks=parks, timed=timed, worlds=worlds)
-    return ScheduleSpace(network, rules, caps, parks, worlds)  # its robots are never alike

@@ -67,7 +67,7 @@ def test_wrong_ways_are_refused(engine, moved, named):
 def test_a_brick_is_not_stretched(engine25):
     """Along it both of its nodes go halfway; all else is as asked."""
     net, grips = engine25.network, np.array([[22, 23, 3]])
-    first, second = (net.node_position[net.index_of_node[n]] for n in grips[0, :2])
+    first, second = (net.node_position[net.node_name.index(int(n))] for n in grips[0, :2])
     axis = (second - first) / np.linalg.norm(second - first)
     moved = drawn(grips, 1e-4)
     stretched = moved + np.array([[-2e-3, 6e-3, 0.0]])[..., None] * axis
@@ -83,7 +83,7 @@ def test_a_hand_that_takes_all_force_away(engine25):
     """Moved where the node goes by itself, a grip bears nothing: forces undo no displacements."""
     net = engine25.network
     free = engine25.solve(9, np.zeros((1, 0), dtype=int), Want.ALL)
-    node = net.index_of_node[13]
+    node = net.node_name.index(13)
     found = engine25.solve(9, [[13]], Want.ALL, free.displacement[:, [node]])
     assert np.abs(found.grip_force).max() <= 1e-8
     assert np.abs(found.displacement - free.displacement).max() <= 1e-12

@@ -25,7 +25,7 @@ from experiments.calibration.parts.barrel_vaults import (
 )
 from experiments.harness.results import RESULTS
 from experiments.harness.scenes import barrel_vault
-from seqopt.network._mechanics import spring_maps
+from experiments.placement.parts.staged import spring_maps
 from seqopt.network.build import build_network
 from seqopt.study.published import printed
 

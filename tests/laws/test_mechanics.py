@@ -48,7 +48,7 @@ def imbalance(net, bricks, grips, fields):
     for b in range(bricks):
         add(b, center[b], net.weight[b])
     for node, force in zip(grips[0], fields.grip_force[0], strict=True):
-        i = net.index_of_node[int(node)]
+        i = net.node_name.index(int(node))
         add(net.node_brick[i], net.node_position[i], force)
     for s, wrench in enumerate(fields.joint_wrench[0]):
         for body, sign in zip(net.springs.bodies[s], (-1.0, 1.0), strict=True):
@@ -124,7 +124,7 @@ def test_gripped_nodes_stay(state):
     engine = ComplianceEngine(net)
     motion = engine.solve(bricks, grips).displacement[0]
     free = engine.solve(bricks, np.zeros((1, 0), dtype=np.int64)).displacement[0]
-    held = [net.index_of_node[int(n)] for n in grips[0]]
+    held = [net.node_name.index(int(n)) for n in grips[0]]
     assert np.abs(motion[held]).max(initial=0) <= 1e-9 * np.abs(free).max()
 
 

@@ -25,7 +25,7 @@ MIRRORS = [(-1.0, 1.0, 1.0), (1.0, -1.0, 1.0)]
 
 def left_over(net, bricks, grips, fields):
     """Force and moment about the origin, (6,), of weight, grips and ground ends summed."""
-    places = [net.index_of_node[int(node)] for node in grips[0]]
+    places = [net.node_name.index(int(node)) for node in grips[0]]
     points = np.vstack(
         [net.centroid[:bricks], net.node_position[places], net.springs.anchor[net.springs.support]]
     )

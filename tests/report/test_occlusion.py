@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.report.draw import View, _drawing_order
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import _boxes, box_corners
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.scene_file import load_scene
 
@@ -17,10 +17,11 @@ WALL = wall(WallShape(columns=4, courses=4, gap=0.01))
 
 def meets(shapes, start, toward):
     """Return where rays leave boxes toward the viewer, (n,); NaN for boxes that one misses."""
-    ray = shapes.frame @ toward
-    here = (shapes.frame @ (start - shapes.place)[:, :, None])[:, :, 0]
+    place, frame, half = shapes
+    ray = frame @ toward
+    here = (frame @ (start - place)[:, :, None])[:, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = (-shapes.half - here) / ray, (shapes.half - here) / ray
+        one, other = (-half - here) / ray, (half - here) / ray
     enters = np.minimum(one, other).max(axis=1)
     leaves = np.maximum(one, other).min(axis=1)
     return np.where(enters < leaves, leaves, np.nan)
@@ -28,8 +29,8 @@ def meets(shapes, start, toward):
 
 def hidden_wrongly(scene, view, order, rays):
     """Count rays on which a box that is drawn later is farther from the viewer."""
-    shapes, axes = boxes(scene.bricks), view.axes()
-    seen = shapes.corners() @ axes.T
+    shapes, axes = _boxes(scene.bricks), view.axes()
+    seen = box_corners(scene.bricks) @ axes.T
     low, high = seen.reshape(-1, 3).min(axis=0), seen.reshape(-1, 3).max(axis=0)
     rng = np.random.default_rng(1)
     rank = np.argsort(order)
@@ -47,7 +48,7 @@ def hidden_wrongly(scene, view, order, rays):
 @given(azimuth=st.integers(-180, 180), elevation=st.integers(20, 80))
 def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
     view = View(azimuth, elevation)
-    order = _drawing_order(boxes(WALL.bricks).corners(), view.axes())
+    order = _drawing_order(box_corners(WALL.bricks), view.axes())
     assert sorted(order) == [*range(16)]
     assert hidden_wrongly(WALL, view, order, 80) == 0
 
@@ -55,7 +56,7 @@ def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
 @pytest.mark.parametrize("name", ["arch25", "dome163"])
 def test_built_in_scenes_are_drawn_in_order(name):
     scene, view = load_scene(name), View(35, 22)
-    order = _drawing_order(boxes(scene.bricks).corners(), view.axes())
+    order = _drawing_order(box_corners(scene.bricks), view.axes())
     assert sorted(order) == [*range(len(scene.bricks))]
     rays = 4000 if name == "arch25" else 400
     assert hidden_wrongly(scene, view, order, rays) == 0
@@ -64,5 +65,5 @@ def test_built_in_scenes_are_drawn_in_order(name):
 def test_depth_of_the_middles_alone_draws_a_wall_wrongly():
     """Negative control: the order of the middles hides what is in front."""
     view = View(35, 22)
-    depth = boxes(WALL.bricks).place @ view.axes()[2]
+    depth = _boxes(WALL.bricks)[0] @ view.axes()[2]
     assert hidden_wrongly(WALL, view, np.argsort(depth).tolist(), 300) > 0

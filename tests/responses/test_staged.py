@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from scipy import linalg
 
-from experiments.placement.parts.staged import Placing, analyze_staged, staged_fields
+from experiments.placement.parts.staged import Placing, analyze_staged, spring_maps, staged_fields
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
-from seqopt.network._mechanics import node_motion, spring_maps
+from seqopt.network._mechanics import node_motion
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Joint
 from seqopt.sequence.methods import cantilever, sequential

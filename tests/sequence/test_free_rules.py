@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.build import build_network
-from seqopt.sequence._rule_space import free_space, node_numbers, sort_robots
+from seqopt.sequence._rule_space import free_space, sort_robots
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import small_arch
@@ -69,7 +69,7 @@ def test_robots_of_one_kind_are_found():
 
 def named(space, bricks, states):
     """States as a plain value: by kind the set of nodes held, and the regrips."""
-    numbers = np.array([0, *node_numbers(space.network)])
+    numbers = np.array([0, *space.network.scene.placed_nodes])
     for row in states.tolist():
         held = tuple(frozenset(int(numbers[n]) for n in row[a:b] if n > 0) for a, b in space.slots)
         yield bricks, held, row[-1] if space.rules.regrips is not None else 0
@@ -97,7 +97,7 @@ def all_of_space(space):
                 joined |= set(ends)
             entry = np.concatenate([entry[:0], *(moves.states for moves in parts)])
         if bricks < space.levels:
-            moves = space.places(bricks, level)
+            ((moves, _),) = space.onward(bricks, level)
             ends = zip(
                 named(space, bricks, level[moves.source]),
                 named(space, bricks + 1, moves.states),

@@ -51,7 +51,7 @@ def test_cantilever_closed_form(count):
     moment = weight * length * beyond**2 / 2
     tip = (count - 0.25) * length
     sink = (weight * beyond / 1e8 + moment * (tip - np.arange(count) * length) / 1e6).sum()
-    node = engine.network.index_of_node[2 * count - 1]
+    node = engine.network.node_name.index(2 * count - 1)
     assert fields.displacement[0, node, 2] == pytest.approx(-sink, rel=1e-12)
     assert fields.support[0, 0, 2] == pytest.approx(count * weight, rel=1e-12)
     about_anchor = moment[0] + count * weight * 0.05

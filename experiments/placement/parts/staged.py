@@ -25,13 +25,22 @@ from seqopt.engines.interface import Fields, grip_columns
 from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid._mixed import edge_forces, reactions, solve_load, split_pairs
 from seqopt.errors import StepError
-from seqopt.network._mechanics import spring_maps
+from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.responses.table import _grips_of, response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence, require_steps
+
+
+def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
+    """Return which springs act (s,), their `deformation` (s, 6, 6b) and stiffness (s, 6, 6)."""
+    springs, center = network.springs, network.centroid[:bricks]
+    acting = springs.acting(bricks)
+    gap = deformation(springs.bodies[acting], springs.position[acting], center)
+    gaps = gap.toarray().reshape(len(acting), 6, 6 * bricks)
+    return acting, gaps, spring_stiffness(network, acting)
 
 
 class Placing(Enum):

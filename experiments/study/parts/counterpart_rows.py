@@ -24,7 +24,7 @@ from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report.comparison import Comparison, compare
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import box_corners
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
@@ -80,7 +80,7 @@ def ours() -> Ours:
 
 def arch_corners(scene: Scene) -> Floats:
     """Return the corners of all bricks, (8 B, 3), m."""
-    return boxes(scene.bricks).corners().reshape(-1, 3)
+    return box_corners(scene.bricks).reshape(-1, 3)
 
 
 def geometry(own: Ours) -> Rows:

@@ -16,7 +16,7 @@ from seqopt.problem.amounts import NONE, STEPS, MoveArrays
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
 from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Step, _begin_step, check_sequence
 
@@ -34,7 +34,7 @@ def steps_in_hands(
     steps = space.steps(states)
     if not grips:
         return steps
-    numbers = [None, *node_numbers(space.network)]
+    numbers = [None, *space.network.scene.placed_nodes]
     if [len(row) for row in grips] != [len(step.grips) for step in steps] or not all(
         0 <= n < len(numbers) for row in grips for n in row
     ):
@@ -160,7 +160,7 @@ class StateSpace(Space):
 
     def rows(self, part: int, states: Ints) -> Ints:
         """Return labels of states: the level, and the node that each robot holds, 0: none."""
-        numbers = np.array([0, *node_numbers(self.problem.network)])
+        numbers = np.array([0, *self.problem.network.scene.placed_nodes])
         held = states[:, : self.problem.space.robots].astype(np.int64)
         named = np.where(held > 0, numbers[held.clip(min=0)], 0)
         return np.column_stack([np.full(len(held), part), named])
@@ -174,7 +174,7 @@ def seen_steps(problem: States, visited: Visited) -> StepArrays:
     bricks = np.repeat([space.bricks_at(level) for level, *_ in visited.states], counts)
     robots = [robot for kind in space.kinds for robot in kind.robots]
     nodes = np.full((len(rows), len(problem.network.scene.robots)), NONE)
-    nodes[:, robots] = np.array([NONE, *node_numbers(problem.network)])[rows.clip(min=0)]
+    nodes[:, robots] = np.array([NONE, *problem.network.scene.placed_nodes])[rows.clip(min=0)]
     return StepArrays(bricks[graph.target], nodes[graph.source], nodes[graph.target])
 
 

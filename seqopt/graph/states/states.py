@@ -299,10 +299,14 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        from seqopt.sequence._schedule_space import _space_of  # noqa: PLC0415  # candidates need none
+        from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
+        from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
 
+        network, rules, caps, worlds = self.network, self.rules, self.caps, self.worlds
+        if isinstance(rules, Schedule):  # its robots are never alike
+            return ScheduleSpace(network, rules, caps, self.parks, worlds)
         how = {"parks": self.parks, "timed": self.is_timed}
-        return _space_of(self.rules, self.network, self.caps, **how, worlds=self.worlds)
+        return free_space(network, rules, caps, **how, worlds=worlds)
 
     @property
     def worlds(self) -> tuple[Scene, ...]:

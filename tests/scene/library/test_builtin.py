@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt.contact.faces import bare_assembly
 from seqopt.network.build import build_network
-from seqopt.scene.boxes import _separations, boxes
+from seqopt.scene.boxes import _boxes, _separations, box_corners
 from seqopt.scene.scene_file import (
     ABOUT,
     _find_warnings,
@@ -74,7 +74,7 @@ def test_bricks_of_built_in_scenes_touch_and_do_not_interpenetrate(name):
 
 def test_the_vault_has_the_printed_count_and_plan(vault):
     assert len(vault.bricks) == 338
-    corners = boxes(vault.bricks).corners().reshape(-1, 3)
+    corners = box_corners(vault.bricks).reshape(-1, 3)
     assert np.ptp(corners, axis=0)[:2] == pytest.approx(PRINTED, abs=0.001)
 
 
@@ -137,5 +137,5 @@ def test_a_moved_or_swollen_brick_is_found(vault, change, name):
 def test_the_dome_is_round_and_of_the_size_of_benchmarks():
     scene = load_scene("dome163")
     assert len(scene.bricks) == 163
-    lowest = boxes(scene.bricks[:22]).place
+    lowest = _boxes(scene.bricks[:22])[0]
     assert np.ptp(np.linalg.norm(lowest[:, :2], axis=1)) < 1e-12
