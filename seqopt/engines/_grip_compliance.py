@@ -131,18 +131,6 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
 _RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
 
 
-def invertible(matrix: Floats) -> Floats:
-    """Return a compliance (w, w) with an inverse, also where too few joints of an arm give any.
-
-    Grips that are compliant along each axis by itself stay as they are.
-    """
-    values, axes = np.linalg.eigh(matrix)
-    least = _RIGID * values[-1]
-    if values[0] >= least or (values[0] > 0 and not (matrix - np.diag(np.diag(matrix))).any()):
-        return matrix
-    return np.asarray(axes * np.maximum(values, least) @ axes.T)
-
-
 class GripSpring(NamedTuple):
     """A compliant grip as a spring between its node and its far end.
 
@@ -165,10 +153,15 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
     out = []
     for grip in range(grips):
         ways = [way for way in range(6) if (yields[grip] if way < 3 else turns[grip])]
-        if ways:
-            scale = np.repeat([1.0, compliance.lever], 3)[ways]
-            own = invertible(matrix[grip][np.ix_(ways, ways)]) / np.outer(scale, scale)
-            out.append(GripSpring(grip, ways, own, np.pad(offset[grip], (0, 3))[ways]))
+        if not ways:
+            continue
+        scale, own = np.repeat([1.0, compliance.lever], 3)[ways], matrix[grip][np.ix_(ways, ways)]
+        values, axes = np.linalg.eigh(own)
+        least, even = _RIGID * values[-1], not (own - np.diag(np.diag(own))).any()
+        if values[0] < least and not (even and values[0] > 0):  # too few joints give any
+            own = np.asarray(axes * np.maximum(values, least) @ axes.T)
+        offsets = np.pad(offset[grip], (0, 3))[ways]
+        out.append(GripSpring(grip, ways, own / np.outer(scale, scale), offsets))
     return out
 
 

@@ -54,13 +54,6 @@ _TIGHT = 1e-8  # largest violation of forces that prove, over the force scale an
 _IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
-class _HoldingForces(NamedTuple):
-    """Forces with which a structure is in equilibrium."""
-
-    value: float  # their z
-    needed: Floats  # (G,); what every grip exerts, over the force scale
-
-
 class _FallingMotion(NamedTuple):
     """A motion of the blocks, and what counts for any grips.
 
@@ -80,7 +73,8 @@ class _Known:
 
     def __init__(self, assembly: Assembly, case: Case) -> None:
         self._assembly, self._case = assembly, case
-        self._forces: list[_HoldingForces] = []
+        # z of forces in equilibrium, and what every grip exerts (G,), over the force scale
+        self._forces: list[tuple[float, Floats]] = []
         self._motions: list[_FallingMotion] = []
 
     def bracket(self, places: Ints, payload: Floats) -> Floats:
@@ -119,7 +113,7 @@ class _Known:
             clean = replace(answer, value=value, grip_force=grip)
             tight = violation(assembly, case, clean, held) <= _TIGHT * max(1.0, value)
             if tight and not grip[held <= 0].any():
-                self._forces.append(_HoldingForces(value, needed))
+                self._forces.append((value, needed))
         return self
 
     def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:

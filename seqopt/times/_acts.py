@@ -67,18 +67,6 @@ class Acts:
         passed = np.where(origin == NOW, ends[:, None], np.where(origin == HELD, 0.0, passed))
         return ends, alike_in_order(self.groups, self.entries[to], passed), placed
 
-    def counted(self, state: Ints, values: Floats) -> Floats:
-        """Return labels with the readiness and then the ages of mortar that count."""
-        last = 1 + self.count
-        out, columns = values.copy(), slice(1, last)
-        later = np.maximum(values[:, columns], values[:, [0]] - self.longest)
-        out[:, columns] = np.where(self.entries[state] <= 0, later, 0.0)
-        if self.cured is not None:  # what has its full bond could as well be older
-            older = np.maximum(values[:, last:], values[:, [0]] - self.cured.full)
-            stands = np.arange(older.shape[1]) < self.cured.bricks[state][:, None]
-            out[:, last:] = np.where(stands, older, 0.0)
-        return out
-
 
 def alike_in_order(groups: Groups, entries: Ints, since: Floats) -> Floats:
     """Return readiness (k, c) of entries (k, c), in order where robots are alike."""

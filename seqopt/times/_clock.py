@@ -69,7 +69,15 @@ class Clock(Book):
         Who is free for longer than any preparation takes could as well be so for as long: who acts
         again acts no sooner, and who does not is done.
         """
-        return self._acts.counted(state, values)
+        acts, last = self._acts, 1 + self._acts.count
+        out, columns = values.copy(), slice(1, last)
+        later = np.maximum(values[:, columns], values[:, [0]] - acts.longest)
+        out[:, columns] = np.where(acts.entries[state] <= 0, later, 0.0)
+        if acts.cured is not None:  # what has its full bond could as well be older
+            older = np.maximum(values[:, last:], values[:, [0]] - acts.cured.full)
+            stands = np.arange(older.shape[1]) < acts.cured.bricks[state][:, None]
+            out[:, last:] = np.where(stands, older, 0.0)
+        return out
 
 
 class TimedRows:
@@ -83,7 +91,17 @@ class TimedRows:
         self._level = np.array(rebuilt.parts)[rebuilt.part_of()]
         rows = np.concatenate([own[:, : tables.robots] for own in rebuilt.states])
         self._rows = rows.astype(np.int64)
-        self._cured = cured_rows(evaluator, rebuilt, motions)
+        self._cured: CuringStates | None = None
+        standing, begin = problem.standing, problem.rules.begin
+        if standing is not None and standing.curing is not None:
+            counts = [tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
+            bricks, floors = np.array(counts), Floors(problem.network, standing, motions)
+            grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
+            held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
+            asked = bricks[rebuilt.part_of()], held, payload
+            placed, ages = np.zeros(len(floors.full)), () if begin is None else begin.ages
+            placed[: len(ages)] = [-age for age in ages]
+            self._cured = CuringStates(floors.starts, *asked, floors.full, placed)
         scene, own = problem.network.scene, require_durations(problem.network.scene, tables.team)
         times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
         slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
@@ -161,31 +179,6 @@ class Floors:
             out[rows] = later
             rows = rows[np.isfinite(later)]
         return out
-
-
-def cured_rows(
-    evaluator: StateEvaluator, rebuilt: Rebuilt, motions: Sequence[Floats]
-) -> CuringStates | None:
-    """Return the bond that rebuilt states need; None where no mortar cures.
-
-    ``motions``: that are claimed, (b, 6) in m and rad.
-    """
-    problem = evaluator.problem
-    standing, begin = problem.standing, problem.rules.begin
-    if standing is None or standing.curing is None:
-        return None
-    bricks = np.array(
-        [evaluator.tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
-    )
-    grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
-    held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
-    floors = Floors(problem.network, standing, motions)
-    placed = np.zeros(len(floors.full))
-    ages = () if begin is None else begin.ages
-    placed[: len(ages)] = [-age for age in ages]
-    return CuringStates(
-        floors.starts, bricks[rebuilt.part_of()], held, payload, floors.full, placed
-    )
 
 
 def claimed_time(

@@ -254,11 +254,6 @@ def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tupl
     return tuple(d for r in which if (d := scene.robots[r].durations) is not None)
 
 
-def has_durations(scene: Scene) -> bool:
-    """Return whether it is known how long every robot takes."""
-    return bool(scene.robots) and all(robot.durations is not None for robot in scene.robots)
-
-
 def have_speeds(scene: Scene) -> bool:
     """Return whether ways of some robot take time of their own."""
     return any(robot.durations and robot.durations.speed for robot in scene.robots)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import pandas as pd
 
@@ -127,12 +127,3 @@ def reassign(
     idle, every = idle_robots(scene, steps), enumerate(scene.robots)
     known = [r for r, robot in every if robot.durations is not None or robot.name not in idle]
     return reassigned_steps(scene, steps, may, known, waits, begin)
-
-
-def spent_lines(busy: pd.DataFrame) -> Iterator[str]:
-    """Yield the durations of each robot's actions."""
-    for row in busy.to_dict("records"):
-        spent = (
-            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
-        )
-        yield f"  {row['robot']}: {', '.join(spent)}"

@@ -20,10 +20,10 @@ from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import _idle_note
 from seqopt.times._step_check import check_cured
-from seqopt.times._steps import has_durations
-from seqopt.times._tables import busy_table, spent_lines
+from seqopt.times._tables import busy_table
 from seqopt.work.progress import Tell
 
+_SPENT = ("prepares", "acts", "holds", "idle")  # how a robot spends its time
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
@@ -59,7 +59,7 @@ def times(
     output = Output(out, asked.words.get("scene"), asked.words.get("plan"))
     output.require("plan.csv", "times.csv")
     named, taken = asked(progress=progress), tuple[str, ...]()
-    if not has_durations(named.scene):
+    if not all(robot.durations for robot in named.scene.robots):
         built = in_seconds(named.scene, (USUAL_SECONDS,))
         named = named._replace(network=build_network(built))
         taken = (f"durations: not known, taken as {USUAL_SECONDS}; --durations says others",)
@@ -78,7 +78,11 @@ def times(
     lines = [f"{built.name}: {len(build.steps)} steps take {given:.6g} s"]
     if least is not None:
         lines.append(f"the same grips by other robots: {least:.6g} s, the least")
-    lines += [*remarks.waits_said(build), *spent_lines(busy), where]
+    lines += remarks.waits_said(build)
+    for row in busy.to_dict("records"):
+        spent = (f"{what} {row[f'{what}_s']:.6g} s" for what in _SPENT)
+        lines.append(f"  {row['robot']}: {', '.join(spent)}")
+    lines.append(where)
     trouble = posture_trouble(built, asked.words.get("cache"), progress)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(built, build.steps)
     notes = (*taken, *named.notes, *remarks.carrying_notes(built, build.steps))

@@ -173,7 +173,8 @@ class ComplianceEngine(NamedEngine):
         size = len(self._network.inner)
         if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
-                answer = self._frontal.solve(bricks, columns, compliance, _last_correction(want))
+                last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
+                answer = self._frontal.solve(bricks, columns, compliance, last)
                 return keep_wanted(answer, want)
         fast: _FastSolution | None = None
         if bricks <= len(self._tree.spring):
@@ -272,14 +273,9 @@ class ComplianceEngine(NamedEngine):
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
-            last = _last_correction(want)
+            last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
-
-
-def _last_correction(want: Want) -> float:
-    """Return how large a correction may be after which an answer needs no other."""
-    return _SCREEN if Want.SCREEN in want else LAST_CORRECTION
 
 
 def _count_uniform(network: Network) -> int:
