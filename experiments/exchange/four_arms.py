@@ -33,10 +33,10 @@ from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
-from seqopt.report._pictures import VIEW, _build_box, _mark_grips, steps_picture
+from seqopt.report._pictures import VIEW, _build_box, steps_picture
 from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled
-from seqopt.report.draw import _draw_robots, draw_bricks
+from seqopt.report.draw import _draw_robots, draw_bricks, draw_grips
 from seqopt.scene.arm import Arm
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot
@@ -174,7 +174,7 @@ def chart() -> Figure:
             step = steps[number - 1]
             _draw_robots(axes, cell, cell.arms(step, number - 1), VIEW)
             draw_bricks(axes, network, step.bricks, VIEW)
-            _mark_grips(axes, scene, step.grips)
+            draw_grips(axes, network, step.grips, VIEW, named=False)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
             axes.set_title(f"{name}, step {number} of {len(steps)}", loc="center")
     return figure

@@ -171,8 +171,9 @@ class ShownBuild(Shown):
         ``step``: numbers of steps, from 1; by default six that are spread over the build;
         ``forces``: whether to draw the network, colored by axial force, instead of the bricks;
         ``magnify``: how many times larger displacements are drawn than they are; by default not at
-        all. Result: a notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if
-        matplotlib is not installed (extra ``plot``); `StepError` if there is no such step.
+        all, and not with forces. Result: a notebook shows it; ``savefig`` writes it to a file.
+        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there is
+        no such step.
         """
         figure: Figure = display(ShownBuild, "plot")(
             self.engine, self.steps, step, forces=forces, magnify=magnify

@@ -27,13 +27,12 @@ from seqopt.report.draw import (
     draw_grips,
     draw_network,
     force_key,
-    grip_mark,
 )
 from seqopt.responses.table import step_fields
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import box_corners
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Grips, Step, StepKind
+from seqopt.sequence.steps import Step, StepKind
 
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
@@ -115,25 +114,24 @@ def steps_picture(
     """Return a picture of steps of a build, by their numbers from 1, all of one size.
 
     By default `FRAMES`, spread over the build. ``forces``: the network by axial force, not bricks
-    and robots; ``magnify``: times that displacements are drawn larger, or 0; ``arms``: as known.
+    and robots; or ``magnify``: times that displacements are drawn larger; ``arms``: as known.
     """
+    if forces and magnify:
+        raise StepError("forces, magnify: a picture shows one of them; give one")
     picked, scene = _picked(steps, chosen), engine.network.scene
     arms = arms if arms is not None or forces else _known_arms(scene, steps)
     cell = Cell(scene, arms)
     low, high = box = _build_box(cell)
     figure, panels = _panels(box, len(picked), WIDTH, 0.35)
-    want = Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS
     asked = picked if forces or magnify else []
-    fields = {at: step_fields(engine, steps[at], want) for at in asked}
+    fields = {at: step_fields(engine, steps[at], Want.EDGES | Want.BRICKS) for at in asked}
     peaks = (float(np.abs(each.edge_force).max(initial=0.0)) for each in fields.values())
     largest = max(peaks, default=0.0)  # of any edge in these steps, N
     key: dict[int, Line2D] = {}
     for axes, at in zip(panels, picked, strict=True):
         step, drawn = steps[at], (axes, engine.network, steps[at].bricks, VIEW)
         if forces:
-            how: dict[str, Any] = {"edge_force": fields[at].edge_force[0], "magnify": magnify}
-            moved = fields[at].displacement[0] if magnify else None
-            draw_network(*drawn, displacement=moved, largest_force=largest, **how)
+            draw_network(*drawn, edge_force=fields[at].edge_force[0], largest_force=largest)
         else:
             _draw_robots(axes, cell, cell.arms(step, at), VIEW)
             _draw_props(axes, scene, step.bricks, held=bool(step.held), view=VIEW)
@@ -142,11 +140,8 @@ def steps_picture(
                 draw_bricks(*drawn, twist=fields[at].brick_twist[0], magnify=magnify)
         axes.set_title(_describe(scene, step, steps[-1].number), loc="center")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        if len(picked) == 1:
-            draw_grips(axes, engine.network, step.grips, VIEW)
-        else:
-            key |= _mark_grips(axes, scene, step.grips)
-    handles = [key[robot] for robot in sorted(key)]
+        key |= draw_grips(axes, engine.network, step.grips, VIEW, named=len(picked) == 1)
+    handles = [key[robot] for robot in sorted(key) if len(picked) > 1]
     handles += [Line2D([], [], **PROP_MARK, ms=8, label="prop holds")] if scene.props else []
     handles += force_key(largest) if forces else []
     if handles:
@@ -164,18 +159,6 @@ def _describe(scene: Scene, step: Step, last: int) -> str:
         StepKind.REPOSITION: "a robot takes a grip",
     }
     return f"step {step.number} of {last}: {what[step.kind]}"
-
-
-def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> dict[int, Line2D]:
-    """Mark the nodes that robots hold; return the entry of a legend of each, by its index."""
-    key = {}
-    for i, node in enumerate(grips):
-        if node is not None:
-            mark: Any = {**grip_mark(i), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
-            x, y = VIEW.axes()[:2] @ np.array(scene.node_position(node))
-            axes.plot([x], [y], **mark, gid=f"{scene.robots[i].name} at {node}")
-            key[i] = Line2D([], [], **mark, label=f"{scene.robots[i].name} holds")
-    return key
 
 
 def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[int]:

@@ -15,26 +15,11 @@ from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 from seqopt.plan.front import Front
 from seqopt.report._failures import AXIS_WORDS
-from seqopt.report._style import (
-    GRAY,
-    SKY,
-    SMALL,
-    VERMILION,
-    dress,
-    looks,
-    new_figure,
-    plain,
-    styled,
-)
+from seqopt.report._style import GRAY, SKY, SMALL, VERMILION, dress, looks, new_figure, styled
 from seqopt.report.comparison import _in_shown_unit, largest
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 
-COLUMNS = {
-    "M_sup_Nm": "support moment\nM_sup [N m]",
-    "F_max_N": "largest tension\nT_max [N]",
-    "D_max_1e-3mm": "largest displacement\nD_max [µm]",
-}
 CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color
 LABELS = {
@@ -59,33 +44,6 @@ VERDICTS = {
     Verdict.UNDECIDED.value: GRAY,
     Verdict.FALLS.value: VERMILION,
 }  # colors of steps
-
-
-@styled
-def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
-    """Return the largest responses at every number of bricks; equal builds share a line."""
-    numbers = {name: table.select_dtypes("number") for name, table in builds.items()}
-    same: dict[str, tuple[str, ...]] = {}  # by the first of each: a line would hide another
-    for name, own in numbers.items():
-        alike = (n for n in same if numbers[n].shape == own.shape)
-        twin = next((n for n in alike if np.allclose(numbers[n], own, equal_nan=True)), name)
-        same[twin] = (*same.get(twin, ()), name)
-    tables = {}
-    for first, names in same.items():
-        called = (
-            first.replace("_", " ") if len(names) == 1 else f"the same plan: {', '.join(names)}"
-        )
-        tables[called] = numbers[first].groupby("bricks").max().reset_index()
-    figure = new_figure(6.6 + 0.2 * len(tables))
-    figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
-    axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, tables, COLUMNS)
-    handles, labels = axes[0].get_legend_handles_labels()
-    axes[0].get_legend().remove()
-    figure.legend(handles, labels, loc="outside lower left", ncols=1)
-    axes[-1].set_yscale("log")
-    plain(axes[-1].yaxis)
-    return figure
 
 
 def draw_responses(
@@ -140,23 +98,18 @@ def front_figure(
         x, y = (_in_shown_unit(table[c], c) for c in (first, name))
         dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
         mark: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
+        mark["zorder"] = 3
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
             if first in worst and name in worst:
-                axes.plot(
-                    worst[first],
-                    worst[name],
-                    marker,
-                    label=method.replace("_", " "),
-                    zorder=3,
-                    **mark,
-                )
+                words = method.replace("_", " ")
+                axes.plot(worst[first], worst[name], marker, label=words, **mark)
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
         _scale(axes, FAR * float(pd.Series(y).max()))
         dress(axes)
     for axes in panels[len(others) :]:
         axes.set_axis_off()
-    words: dict[str, Any] = {"label": "points of the set: steps of the plan"}
-    figure.colorbar(dots, ax=list(panels), shrink=0.7, ticks=MaxNLocator(integer=True), **words)
+    bar = figure.colorbar(dots, ax=list(panels), shrink=0.7, ticks=MaxNLocator(integer=True))
+    bar.set_label("points of the set: steps of the plan")
     handles, labels = panels[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=4)

@@ -132,29 +132,24 @@ def _in_front(seen: Floats, pairs: Ints) -> Ints:
     return np.asarray(np.where(nearest == farthest, nearest, 0).astype(np.int64))
 
 
-def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
+def draw_network(
     axes: Axes,
     network: Network,
     bricks: int,
     view: View,
     *,
-    displacement: Floats | None = None,
-    magnify: float = 1.0,
     edge_force: Floats | None = None,
     largest_force: float | None = None,
     numbers: bool = False,
 ) -> None:
-    """Draw nodes and edges of the first bricks, in place or moved.
+    """Draw nodes and edges of the first bricks.
 
-    The displacement of every node (N, 3), m, is drawn so many times larger; the axial force of
-    every edge (E,), N, tension positive, colors it and sets its width, of which the largest force
-    is the widest, as `force_key` says. Numbers are those of the nodes that robots may hold.
+    The axial force of every edge (E,), N, tension positive, colors it and sets its width, of which
+    the largest force is the widest, as `force_key` says. Numbers are those of the nodes that robots
+    may hold.
     """
     nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
-    points = network.node_position[:nodes].copy()
-    if displacement is not None:
-        points += magnify * displacement
-    seen = points @ view.axes()[:2].T
+    seen = network.node_position[:nodes] @ view.axes()[:2].T
     segments = list(seen[network.edge_nodes[:edges]])
     look: Any = {"colors": INK, "linewidths": THIN}
     if edge_force is not None:
@@ -235,22 +230,28 @@ def draw_bricks(  # what is drawn, and how, each by its name
     _frame(axes)
 
 
-def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
-    """Mark the nodes that the scene's robots hold, each beside its name."""
-    at = {
-        i: view.axes()[:2] @ np.array(network.scene.node_position(node))
-        for i, node in enumerate(grips)
-        if node is not None
-    }
+def draw_grips(
+    axes: Axes, network: Network, grips: Sequence[int | None], view: View, *, named: bool = True
+) -> dict[int, Line2D]:
+    """Mark the nodes that the scene's robots hold, each beside its name if ``named``.
+
+    Results: entries of a legend by the index of the robot.
+    """
+    scene, key = network.scene, dict[int, Line2D]()
+    held = {i: node for i, node in enumerate(grips) if node is not None}
+    at = {i: view.axes()[:2] @ np.array(scene.node_position(node)) for i, node in held.items()}
     beside, above = (share * max(axes.dataLim.width, axes.dataLim.height, 0.0) for share in NEAR)
     for i, (x, y) in at.items():
-        # labels of neighbors stand in lines, one above the other
-        near = [j for j, (u, v) in at.items() if abs(v - y) <= above and abs(u - x) <= beside]
-        line = sorted(near, key=lambda j: float(at[j][1])).index(i) - (len(near) - 1) / 2
-        mark = grip_mark(i)
-        axes.scatter([x], [y], 90, **mark, edgecolors="white", zorder=5)
-        name = f"{network.scene.robots[i].name} at {grips[i]}"
-        _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
+        robot = scene.robots[i].name
+        name = f"{robot} at {grips[i]}"
+        mark: Any = {**grip_mark(i), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
+        axes.plot([x], [y], **mark, gid=name)
+        key[i] = Line2D([], [], **mark, label=f"{robot} holds")
+        if named:  # labels of neighbors stand in lines, one above the other
+            near = [j for j, (u, v) in at.items() if abs(v - y) <= above and abs(u - x) <= beside]
+            line = sorted(near, key=lambda j: float(at[j][1])).index(i) - (len(near) - 1) / 2
+            _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
+    return key
 
 
 def _draw_robots(

@@ -6,20 +6,17 @@ from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 import pytest
 
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
-from seqopt.report._style import WIDTH, look, looks, new_figure, picture_files, plain
-from seqopt.report.charts import COLUMNS, responses_figure
+from seqopt.report._style import look, looks, new_figure, picture_files, plain
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.blocks import with_shapes
 from tests.builders import six_bricks, small_arch
-from tests.pictures import flaws
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -66,18 +63,6 @@ def test_names_of_neighbors_stand_in_lines_and_a_name_alone_beside_its_mark(axes
     up = {text.get_text(): text.xyann[1] for text in axes.texts}
     assert up["rob3 at 4"] == 0
     assert abs(up["rob1 at 31"] - up["rob2 at 33"]) >= 11
-
-
-def test_a_comparison_is_readable_and_every_plan_has_a_line_of_its_own():
-    engine = make_engine("compliance", build_network(six_bricks()))
-    result = compare(engine, CRITERIA["weighted-published"])
-    figure = responses_figure(result.tables)
-    assert figure.get_figwidth() == WIDTH
-    assert flaws(figure) == []
-    axes, *_ = figure.axes
-    assert len(axes.get_lines()) < len(result.tables)  # equal plans are one line
-    words = " ".join(text.get_text() for text in figure.legends[0].get_texts())
-    assert all(name in words.replace(" ", "_") or name in words for name in ("overlap_dp", "beam"))
 
 
 def test_without_weight_nothing_is_above_the_best():
@@ -141,12 +126,3 @@ def test_logarithmic_axes_have_plain_numbers(limits, words):
     ticks = [tick for tick in axes.get_xticks() if low <= tick <= high]
     assert [axes.xaxis.get_major_formatter()(tick) for tick in ticks] == words
     assert len(axes.xaxis.get_minorticklocs()) == 0
-
-
-def test_equal_tables_are_one_line():
-    rows = {"step": [1, 2, 3], "bricks": [1, 1, 2], **{name: [1.0, 3.0, 2.0] for name in COLUMNS}}
-    table = pd.DataFrame(rows | {"phase": list("abc")})
-    other = table.assign(M_sup_Nm=[1.0, 3.0, 2.5])
-    figure = responses_figure({"a": table, "b": other, "c": table.copy()})
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words == ["the same plan: a, c", "b"]

@@ -60,6 +60,8 @@ def test_forces_and_motion_are_drawn(build):
     )
     assert len({tuple(c) for c in forces.collections[0].get_colors()}) == 2
     assert len(moved.collections) == len(plain.collections) + 1  # where it would be, pale
+    with pytest.raises(StepError, match="a picture shows one of them"):
+        build.plot(30, forces=True, magnify=2000.0)
 
 
 @pytest.mark.parametrize("wrong", [0, "all", [], range(1, 30)])

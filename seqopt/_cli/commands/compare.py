@@ -65,7 +65,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
         With ``speed``: the engine that values plans (compliance; with ``mortar`` every step has to
         stand, too; discrete lets joints open).
     out : pathlib.Path, optional
-        Write tables, figures and a page with all builds.
+        Write tables and a page with all builds; with ``speed`` also its chart.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     if result.speed is not None:
         blocks.append("\n".join([SPEED, str(result.speed)]))
         facts = {"speed": result.speed.facts()}
-    blocks.append(wrapped(outputs.written_to(out, tables="tables, figures", what=WHAT)))
+    blocks.append(wrapped(outputs.written_to(out, tables="tables", what=WHAT)))
     answer = Answer(
         about | {"criterion": costs.name, **_facts(result)} | facts,
         "\n\n".join(blocks),
@@ -113,13 +113,12 @@ def compare(  # noqa: PLR0913  # every option is a parameter
 
 
 def _files(engine: Engine, result: Comparison, tell: Tell) -> dict[str, bytes | str]:
-    """Return tables, figures and the page of a comparison by file name."""
+    """Return tables, the chart of speed and the page of a comparison by file name."""
     tell("drawing figures")
     speed = result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-        **outputs.picture("responses", lambda c: c.responses_figure(result.tables)),
         PAGE: comparison_page(engine, result),
     }
     if speed is not None:
