@@ -5,21 +5,41 @@ However plans are found: only a search that looked at everything says that there
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
+import networkx as nx
+import numpy as np
 import pytest
+from hypothesis import given, settings
 
 import seqopt
+from experiments.harness.scenes import longer
 from formulations.states._search import exact_best, narrow
-from seqopt.errors import InfeasibleError, NothingFoundError
+from seqopt.errors import (
+    InfeasibleError,
+    NothingFoundError,
+    ProblemError,
+    SolverError,
+    StepError,
+    TimeUpError,
+)
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states._visits import StateSpace
+from seqopt.graph.states.explored import explore
 from seqopt.graph.states.states import build_states, within
+from seqopt.judge._schedules import judge_schedule, plan_values
+from seqopt.network.build import build_network
+from seqopt.plan.front import FrontProblem, find_front
+from seqopt.problem.requirements import Limit
+from seqopt.sequence.methods import modified_sequential
 from seqopt.sequence.rules import FreeRules
-from tests.brute_force import ONES
+from tests.brute_force import ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
+from tests.strategies import free_builds
 from tests.times.builders import engine_of
 
 FACTORS = (1.0, 1.02)
@@ -137,3 +157,197 @@ def test_a_narrow_search_finds_none_and_says_no_more():
     assert low.rise(1.01 * seqopt.solve(problem).objective["minmax"])
     with pytest.raises(NothingFoundError):  # states above the threshold were left out
         exact_best(low, tight.budgets)
+
+
+# the free schedule and its Pareto sets against brute force on small builds, and on the arch
+
+
+@pytest.mark.slow
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=6, deadline=None)
+def test_over_scenarios_it_equals_brute_force(build):
+    """A state is what it is in its worst scenario, and is allowed in all; so says the judge."""
+    scene, rules = build
+    scenes = seqopt.scenarios(scene, stiffness=(0.3, 3.0), count=3, seed=1).scenes
+    graphs = [whole_graph(seqopt.make_engine("compliance", each), rules) for each in scenes]
+    common = graphs[0][0].copy()
+    common.remove_nodes_from([n for n in graphs[0][0] if any(n not in g for g, _ in graphs)])
+    costs = {n: max(peaks(g)[n] for g, _ in graphs) for n in common if n != "end"}
+    best = least_peak(common, graphs[0][1], costs) if "end" in common else None
+    engine = seqopt.make_engine("compliance", build_network(scene))
+    problem = seqopt.pose(engine, rules, ONES, "minmax,steps", scenarios=scenes)
+    if best is None:
+        with pytest.raises(InfeasibleError, match="free schedule: "):
+            seqopt.solve(problem, "schedule_search")
+        return
+    plan = seqopt.solve(problem, "schedule_search")
+    steps = nx.shortest_path_length(best[1], graphs[0][1], "end") - 1
+    assert plan.certificate.values == pytest.approx((best[0], steps))
+    assert plan.certificate.gap == 0
+    assert plan.summary()["scenarios"] == 3
+    problem = plan.states
+    values = [plan_values(each, plan.steps)[0] for each in problem.each]
+    assert max(values) == pytest.approx(best[0])
+    milder = [e for e, v in zip(problem.scenarios, values, strict=True) if v < 0.999 * best[0]]
+    if milder:  # the control: what is worst is seen to be missing
+        with pytest.raises(SolverError, match=r"minmax is .*, not .* as claimed"):
+            judge_schedule(replace(problem, scenarios=tuple(milder)), plan.selection, plan.steps)
+
+
+def dominated(point, points):
+    return any((p <= point).all() and (p < point).any() for p in points)
+
+
+def brute_front(engine, rules, step):
+    """All vectors that no plan dominates, by trying every combination of values that occur."""
+    graph, start = whole_graph(engine, rules)
+    worst = {
+        n: np.ceil(d["worst"][[0, 1]] / step - 1e-9) * step
+        for n, d in graph.nodes(data=True)
+        if n != "end"
+    }
+    values = [sorted({w[k] for w in worst.values()}) for k in range(2)]
+    found = []
+    for point in map(np.array, product(*values)):
+        if not dominated(point, found) and not any((p == point).all() for p in found):
+            kept = [n for n in graph if n == "end" or (worst[n] <= point).all()]
+            if start in kept and nx.has_path(graph.subgraph(kept), start, "end"):
+                found.append(point)
+    return sorted(tuple(p) for p in found if not dominated(p, found))
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=6, deadline=None)
+def test_pareto_sets_equal_brute_force(build):
+    scene, rules = build
+    engine = seqopt.make_engine("compliance", scene)
+    step = np.array([5.0, 2.0])
+    problem = build_states(engine, rules, ONES, "F_largest,M_sup")
+    expected = brute_front(engine, rules, step)
+    front = FrontProblem(problem, {"F_largest": 5.0, "M_sup": 2.0})
+    if not expected:
+        with pytest.raises(InfeasibleError):
+            find_front(front)
+        return
+    found = find_front(front)
+    assert found.complete
+    assert found.table[["F_largest", "M_sup"]].to_numpy() == pytest.approx(np.array(expected))
+
+
+@pytest.fixture(scope="module")
+def arch(engine25):
+    return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
+
+
+def pose_goals(text):
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    return build_states(engine, FreeRules(), ONES, text).goals
+
+
+def test_all_states_of_the_arch_are_counted(arch):
+    assert explore(arch).graph().graph.states == 71035  # start and end among them
+
+
+@pytest.mark.slow
+def test_where_memory_ends_there_is_a_bound(arch):
+    best = seqopt.solve(arch, "schedule_search").selection.objective[0]
+    short = seqopt.solve(replace(arch), "schedule_search", max_memory=1e6)
+    assert (short.status, short.selection.stopped) == ("feasible", "memory")
+    assert best / 2 < short.selection.bound[0] <= best <= short.selection.objective[0]
+    for words, error, said in (
+        ({"max_memory": 1e3}, ProblemError, "max_memory: it is too"),
+        ({"seconds": 0}, TimeUpError, "no plan was found yet"),
+    ):
+        for aim in ("minmax", "tilt,minmax"):
+            problem = replace(arch, goals=pose_goals(aim))
+            with pytest.raises(error, match=said):
+                seqopt.solve(problem, "schedule_search", **words)
+
+
+class Clock:
+    """A clock that moves on by a million seconds whenever it is looked at."""
+
+    now = 0.0
+
+    def perf_counter(self):
+        self.now += 1e6
+        return self.now
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (0.5e6, "no plan is allowed; time was over before it was known what helps"),
+        (np.inf, "is never placed; it becomes possible with F_largest="),
+    ],
+)
+def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, said):
+    """What is known by then is said."""
+    engine = seqopt.make_engine("compliance", small_arch(5))
+    problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
+    clock = Clock()
+    for module in ("_infeasible",):
+        monkeypatch.setattr(f"seqopt.plan.{module}.time", clock)
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(problem, "schedule_search", time_limit=limit)
+
+
+@pytest.mark.slow
+def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
+    two = FreeRules(robots=("rob1", "rob2"), least_grips=2)
+    said = (
+        r"brick 3 \(3 of 25\) is never placed; it becomes possible with least_grips=1 together "
+        r"with payload=ignored \(--rule least_grips=1 --rule payload=ignored\)"
+    )
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(replace(arch, rules=two), "schedule_search")
+    tight = build_states(engine25, FreeRules(), ONES, "steps", [Limit("F_largest", 200.0)])
+    with pytest.raises(InfeasibleError, match=r"F_largest=217 instead of 200"):
+        seqopt.solve(tight, "schedule_search")
+    enough = [Limit("F_largest", 216.006)]
+    assert seqopt.solve(replace(tight, limits=tuple(enough)), "schedule_search").steps
+
+
+def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force():
+    """Where a step without an open grip decides, less in the open ones is worth nothing."""
+    engine = seqopt.make_engine("compliance", small_arch(5))
+    loop = modified_sequential(engine.network)
+    problem = build_states(engine, loop, ONES, "T_max,F_largest")
+    front, values = find_front(FrontProblem(problem)), set()
+    for nodes in product(*(move.candidates for move in loop.moves)):
+        with contextlib.suppress(StepError):
+            values.add(tuple(np.round(plan_values(problem, loop.fill(nodes)), 6)))
+    others = {each: np.array([o for o in values if o != each]) for each in values}
+    kept = {each for each, some in others.items() if not (some <= each).all(axis=1).any()}
+    assert front.complete
+    assert {tuple(row) for row in front.table[["T_max", "F_largest"]].round(6).to_numpy()} == kept
+
+
+def strictly_below(problem, value):
+    """How many models tell which states below a value are reached, in whole levels."""
+    space, entering = problem.space, {problem.space.first: [problem.space.start()]}
+    for level in range(space.first, space.levels + 1):
+        fresh, known = np.concatenate(entering.pop(level, [space.start()[:0]])), np.zeros(0, int)
+        while len(fresh):
+            codes, first = np.unique(space.codes(fresh), return_index=True)
+            states, known = fresh[first[~np.isin(codes, known)]], np.union1d(known, codes)
+            if level > space.first:
+                values, allowed = problem.values(level, states)
+                states = states[allowed & (values[:, 0] < value * (1 - 1e-9))]
+            within = space.within(level, states) if level else ()
+            fresh = np.concatenate([states[:0], *(moves.states for moves, _ in within)])
+            able = states[space.may_place(level, states)] if level < space.levels else states[:0]
+            more = space.onward(level, able) if len(able) else ()
+            entering.setdefault(level + 1, []).extend(moves.states for moves, _ in more)
+    return problem.models
+
+
+@pytest.mark.slow
+def test_a_large_search_looks_at_little_more_than_its_proof_needs():
+    """The models of states strictly below the least worst value, and a tenth for a first plan."""
+    scene = longer(seqopt.load_scene("arch25"), 4.0)
+    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps"
+    plan = seqopt.solve(build_states(seqopt.make_engine("compliance", scene), *asked))
+    fresh = build_states(seqopt.make_engine("compliance", scene), *asked)
+    assert plan.certificate.gap == 0
+    assert plan.models <= 1.1 * strictly_below(fresh, plan.objective["minmax"])

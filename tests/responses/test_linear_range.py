@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -12,12 +13,15 @@ from scipy.spatial.transform import Rotation
 from seqopt._cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses.table import _STRAIN, LinearRange, analyze
+from seqopt.responses.quantities import RESPONSES, responses_of, support_forces, support_moments
+from seqopt.responses.table import _STRAIN, LinearRange, analyze, support_columns
 from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.methods import cantilever, sequential
+from seqopt.sequence.steps import Step, StepKind
 from seqopt.study.published import published_plan
-from tests.builders import small_arch
+from tests.builders import from_both_sides, small_arch
 
 WORDS = "arch:span=3,rise=1.2,bricks=21,density=2000,dimensions=0.18x0.1x0.06"
 
@@ -206,3 +210,68 @@ def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, en
     table.loc[1, "D_max_1e-3mm"] = 6e3
     (left,) = LinearRange(made).departures(table)
     assert (left.what, left.steps) == ("displacement", (2,))
+
+
+# the largest over the ground ends is what tables, criteria and limits see
+
+
+@pytest.fixture(scope="module")
+def arch():
+    return ComplianceEngine(build_network(from_both_sides(9, "VLR")))
+
+
+def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
+    """The fault: a robot relieves one end, and the other, which bears four times as much, hid."""
+    inward = zip(range(1, 26), range(25, 0, -1), strict=True)
+    order = tuple(itertools.chain.from_iterable(inward))[:25]
+    engine = ComplianceEngine(build_network(replace(arch25, build_order=order)))
+    answers = engine.solve(16, [[15], [36]])
+    each, seen = support_moments(answers), responses_of(engine.network, answers)["M_sup"]
+    assert (each.argmax(axis=1) == [1, 0]).all()
+    assert (each.max(axis=1) > 4 * each.min(axis=1)).all()
+    assert (seen == each.max(axis=1)).all()
+
+
+def test_the_largest_force_keeps_its_sign():
+    """Also where it points down, and the other end's is smaller or none."""
+    net = build_network(from_both_sides(7))
+    fields = ComplianceEngine(net).solve(5, np.zeros((1, 0), dtype=np.int64))
+    for forces, wanted in (
+        ([[0, 0, -3.0], [0, 0, 2.0]], -3.0),
+        ([[0, 0, -3.0], [4.0, 0, 0]], 4.0),
+        ([[0, 0, 0.0], [0, 3.0, -4.0]], -5.0),
+        ([[0, 0, -2.0], [0, 0, 2.0]], 2.0),
+        ([[0, 0, 2.0], [0, 0, -2.0]], 2.0),
+        ([[0, 0, 0.0], [0, 0, 0.0]], 0.0),
+    ):
+        support = np.zeros((1, 2, 6))
+        support[0, :, :3] = forces
+        known = replace(fields, support=support)
+        assert RESPONSES["F_sup"].of(net, known) == pytest.approx([wanted])
+        assert np.abs(support_forces(net, known)).max() == abs(wanted)
+
+
+def test_tables_have_columns_per_end(arch):
+    steps = [Step(1, StepKind.PLACE, 1, (1, None, None)), Step(2, StepKind.PLACE, 8, (2, 3, None))]
+    table = analyze(arch, steps)
+    assert support_columns(arch.network.scene) == [
+        ("F_sup_1_N", "M_sup_1_Nm"),
+        ("F_sup_9_N", "M_sup_9_Nm"),
+    ]
+    assert list(table)[-5:] == [
+        "D_std_1e-3mm",
+        *itertools.chain.from_iterable(support_columns(arch.network.scene)),
+    ]
+    assert table.loc[0, ["F_sup_9_N", "M_sup_9_Nm"]].isna().all()  # brick 9 does not stand yet
+    assert table.loc[0, "M_sup_Nm"] == table.loc[0, "M_sup_1_Nm"] > 0
+    assert table.loc[1, "M_sup_Nm"] == max(table.loc[1, ["M_sup_1_Nm", "M_sup_9_Nm"]])
+    assert abs(table.loc[1, "F_sup_N"]) == table.loc[1, ["F_sup_1_N", "F_sup_9_N"]].abs().max()
+
+
+def test_one_end_needs_no_columns_of_its_own():
+    arch = small_arch(3)
+    free = replace(arch, grounds=arch.grounds[:1])
+    table = analyze(
+        ComplianceEngine(build_network(free)), [Step(1, StepKind.PLACE, 1, (1, None, None))]
+    )
+    assert list(table)[-1] == "D_std_1e-3mm"
