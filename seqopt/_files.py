@@ -122,34 +122,27 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text)
 
 
-def csv_text(table: pd.DataFrame, digits: int = 6) -> str:
-    """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula."""
+def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int = 6) -> str:
+    """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula.
 
-    def safe(value: object) -> object:
-        return harmless(value) if isinstance(value, str) else value
+    Rows of equal columns are written without loading pandas.
 
-    numeric = pd.api.types.is_numeric_dtype
-    columns = [c if numeric(c.dtype) else c.map(safe) for _, c in table.items()]
-    told = (pd.concat(columns, axis=1) if columns else table).rename(columns=safe)
-    return str(told.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
-
-
-def rows_text(rows: Sequence[Mapping[str, object]], digits: int = 6) -> str:
-    """Return rows of equal columns as CSV, as `csv_text`, but without loading pandas.
-
-    >>> rows_text([{"step": 1, "brick": "=a", "tilt": 2 / 3}]).splitlines()
+    >>> csv_text([{"step": 1, "brick": "=a", "tilt": 2 / 3}]).splitlines()
     ['step,brick,tilt', "1,'=a,0.666667"]
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([harmless(name) for name in rows[0]] if rows else [])
+    if isinstance(table, Sequence):
+        names, rows = [*table[0]] if table else [], [tuple(row.values()) for row in table]
+    else:
+        found = table.astype(object).where(table.notna(), None)
+        names, rows = [*table], [*found.itertuples(index=False, name=None)]
 
     def cell(value: object) -> object:
         if isinstance(value, float):
             return "" if math.isnan(value) else f"{value:.{digits}g}"
         return "" if value is None else harmless(value) if isinstance(value, str) else value
 
-    writer.writerows(map(cell, row.values()) for row in rows)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(map(cell, row) for row in [names, *rows])
     return text.getvalue()
 
 

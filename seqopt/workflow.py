@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +25,7 @@ from seqopt.plan.solve import _solve_run
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
-from seqopt.problem.requirements import LARGEST, Criterion, Limit
+from seqopt.problem.requirements import LARGEST, Criterion, Limit, number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
@@ -41,6 +41,7 @@ from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell
 
+SPREADS = ("stiffness", "density", "position", "grips")
 SEARCH = "search"  # the order that is sought
 FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
@@ -134,19 +135,39 @@ def _parse_size(text: str) -> float:
     return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
+def parse_numbers(
+    where: str, texts: Iterable[str], known: Sequence[str], *, zero: bool = False
+) -> dict[str, float]:
+    """Parse positive numbers from ``NAME=VALUE``, by name."""
+    out: dict[str, float] = {}
+    for text in texts:
+        name, value = split_word(text)
+        if name not in known:
+            hint, names = did_you_mean(name, known), ", ".join(known)
+            raise ProblemError(f"{where} {text} does not exist{hint}; give one of {names}")
+        out[name] = number_word(value, f"{where} {text}", zero=zero)
+    return out
+
+
 @dataclass(frozen=True, kw_only=True)
 class Robust:
-    """Scenarios for a robust plan, and its aim over them.
+    """Scenarios for a robust plan, and what counts of them.
 
     Parameters
     ----------
-    aim : RobustAim or str, optional
-        ``"worst-peak"``, ``"worst-total"`` or as ``"cvar=0.9"``.
-    vary : mapping of str to float, optional
-        How far samples are from the scene: ``stiffness`` of joints and ``grips`` of robots by a
-        factor, ``density`` by a share, ``position`` by m.
-    count, seed : int, optional
-        How many samples are drawn, and which.
+    measure : RobustAim or str, optional
+        What is to be as small as possible over all scenarios, in place of ``formulation``:
+        worst-peak (the largest cost of any step; default, also where only samples are described),
+        worst-total (the largest total), or cvar=0.9 (the mean total of the worst tenth).
+    count : int, optional
+        How many samples of the scene are drawn (default: {default}).
+    seed : int, optional
+        Which samples are drawn (default: {default}).
+    vary : mapping of str to float or sequence of str, optional
+        How far samples are from the scene: stiffness=3 (of each joint, by a factor up to it, up or
+        down), density=0.1 (of each brick, up to this share), position=0.002 (of each brick and
+        joint, up to so many m); these are the defaults; grips=2 (of grips that are not rigid, by a
+        factor up to it).
     scenes : Scenarios or sequence of Scene, optional
         Scenarios in place of drawn ones.
 
@@ -156,15 +177,18 @@ class Robust:
     [0.5, 2.0]
     """
 
-    aim: RobustAim | str = WORST_PEAK
-    vary: Mapping[str, float] = field(default_factory=dict)
+    measure: RobustAim | str = WORST_PEAK
     count: int = 30
     seed: int = 0
+    vary: Mapping[str, float] | Sequence[str] = field(default_factory=dict)
     scenes: Scenarios | Sequence[Scene] = ()
 
     def draw(self, scene: Scene) -> Scenarios:
         """Draw the samples of a scene."""
-        spread = {"stiffness": 3.0, "grips": 1.0, **self.vary}
+        vary = self.vary
+        if not isinstance(vary, Mapping):
+            vary = parse_numbers("vary", vary, SPREADS, zero=True)
+        spread = {"stiffness": 3.0, "grips": 1.0, **vary}
         factor, grips = spread.pop("stiffness"), spread.pop("grips")
         for name, each in (("stiffness", factor), ("grips", grips)):
             if each < 1:
@@ -362,9 +386,11 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     if begin.site is not None or end is not None:
         moves = replace(moves.free(), begin=begin.site, finish=end)
     limits: Sequence[Any] = parse_limits(asked["limits"], scene)
-    others = (asked["aim"], stands, sought)
-    states = _chooses_states(moves, asked["formulation"], limits, others)
-    over: RobustAim | str = WORST_PEAK if robust is None else robust.aim
+    states = asked["aim"] or stands or sought or not moves.has_pairs
+    states = states or any(isinstance(each, Filter) for each in limits)
+    if not states and asked["formulation"] is not None:
+        states = find_formulation(asked["formulation"]).of_states
+    over: RobustAim | str = WORST_PEAK if robust is None else robust.measure
     usual, minimized = DEFAULTS[FREE if states else "any other"]
     minimized = minimized if str(over) == str(WORST_PEAK) else ""  # totals are of sums
     return pose(
@@ -383,16 +409,6 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
             search.workers, search.executor, search.memory, None if states else asked["progress"]
         ),
     )
-
-
-def _chooses_states(
-    moves: Any, formulation: str | None, limits: Sequence[object], others: Sequence[object]
-) -> bool:
-    """Return whether states are chosen, not candidates; ``others``: options that need states."""
-    filtered = any(isinstance(each, Filter) for each in limits)
-    if any(others) or filtered or not moves.has_pairs:
-        return True
-    return formulation is not None and find_formulation(formulation).of_states
 
 
 def _find_moves(

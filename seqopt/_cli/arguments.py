@@ -34,7 +34,8 @@ seqopt --help names all commands, seqopt COMMAND --help what each can do.
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-LEADS = {"limit": "limits", "option": "options", "to": "to"}  # parameters, by what names them
+LEADS = {"limit": "limits", "option": "options"}  # parameters, by the words that messages have
+LEADS |= {"to": "to", "vary": "vary"}
 LEADS |= {n: n for n in ("begin", "criterion", "direction", "engine", "lost", "missing", "rules")}
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
 

@@ -71,7 +71,7 @@ def read_steps(
     """
     if method is not None and plan is not None:
         raise ProblemError(f"--method {method}: not allowed with --plan; leave one of them out")
-    network, named = build_network(scene.read(robots)), robots if isinstance(robots, tuple) else ()
+    network, named = build_network(scene.parse(robots)), robots if isinstance(robots, tuple) else ()
     given = plan or (None if method else scene.folder)
     if robots and (given is not None or method == PUBLISHED):
         raise StepError(

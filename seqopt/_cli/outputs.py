@@ -9,14 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._files import (
-    csv_text,
-    require_apart,
-    require_folder,
-    rows_text,
-    write_folder,
-    write_text,
-)
+from seqopt._files import csv_text, require_apart, require_folder, write_folder, write_text
 from seqopt._later import Later
 from seqopt._showing import PAGE
 from seqopt.plan.build import ShownBuild
@@ -57,12 +50,9 @@ def plan_files(plan: Plan) -> dict[str, bytes | str]:
     if plan.makespan is not None:
         tables["times"] = plan.times()
     files: dict[str, bytes | str] = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
-    return {**files, **task_files(plan), **time_files(plan)}
-
-
-def time_files(plan: ShownBuild) -> dict[str, bytes]:
-    """Return the Gantt chart of a build by file name, if durations are known."""
-    return {} if plan.makespan is None else picture("times", lambda _: plan.gantt())
+    if plan.makespan is not None:
+        files |= picture("times", lambda _: plan.gantt())
+    return {**files, **task_files(plan)}
 
 
 def task_files(plan: ShownBuild) -> dict[str, str]:
@@ -79,10 +69,9 @@ def put_table(
     path: Path | None, table: pd.DataFrame | Sequence[Mapping[str, object]], said: str
 ) -> dict[str, Any]:
     """Write a table, and return the entries of its answer; without a file the table is the text."""
-    text = rows_text(table) if isinstance(table, Sequence) else csv_text(table)
     if path is None:
-        return {"data": text}
-    write_text(path, text)
+        return {"data": csv_text(table)}
+    write_text(path, csv_text(table))
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 

@@ -74,8 +74,7 @@ def refused(prover: BuildProver) -> tuple[str, ...]:
 
 def settlement_notes(scene: Scene) -> tuple[str, ...]:
     """Return a note that verdicts neglect movements of the ground, if there are any."""
-    said = _settlement_said(scene)
-    return (f"stability: {said}",) if said else ()
+    return tuple(f"stability: {said}" for said in [_settlement_said(scene)] if said)
 
 
 def kept_range(answer: Answer, beyond: str | None) -> Answer:

@@ -150,8 +150,8 @@ class Signature:
     spread: Mapping[str, Spread]
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return values of parameters, of values or words for options; None means the default."""
-        values = {name: each for name, each in given.items() if each is not None}
+        """Return values of parameters, of values or words for options; of none the default."""
+        values = {name: each for name, each in given.items() if each not in (None, [], ())}
         values |= {
             n: self.options[n].parse(each) for n, each in values.items() if n in self.options
         }

@@ -125,22 +125,16 @@ def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
     """
     with warnings.catch_warnings(), NUMPY.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)
-        warnings.simplefilter("ignore" if quiet else "always", SceneWarning)
-        warnings.simplefilter("ignore" if quiet else "always", PluginWarning)
-        warnings.showwarning = _as_a_line(warnings.showwarning)
+        for kind in (SceneWarning, PluginWarning):
+            warnings.simplefilter("ignore" if quiet else "module", kind)
+        otherwise = warnings.showwarning
+
+        def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+            if issubclass(category, SceneWarning | PluginWarning):
+                complain(f"seqopt: warning: {message}")
+            else:
+                otherwise(message, category, *rest)
+
+        shown: Callable[..., None] = show_warning
+        warnings.showwarning = shown
         yield
-
-
-def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
-    said = set[str]()
-
-    def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
-        if str(message) in said:
-            return
-        if issubclass(category, SceneWarning | PluginWarning):
-            said.add(str(message))
-            complain(f"seqopt: warning: {message}")
-        else:
-            otherwise(message, category, *rest)
-
-    return show_warning

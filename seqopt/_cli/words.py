@@ -7,7 +7,7 @@ meaning in all commands.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
@@ -17,8 +17,7 @@ from seqopt.contact.mortar import MORTARS, Mortar, _find_curing, find_mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import FileError, ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import formulation_names
-from seqopt.problem.problem import parse_robust
-from seqopt.problem.requirements import number_word, split_word
+from seqopt.problem.requirements import number_word
 from seqopt.problem.standing import Standing
 from seqopt.scene._checks import short
 from seqopt.scene.parts import Prop
@@ -35,7 +34,6 @@ File: TypeAlias = Annotated[Path | None, ("value", "FILE")]
 Folder: TypeAlias = Annotated[Path | None, ("value", "DIR")]
 
 MOST_WORKERS = 1024
-SPREADS = ("stiffness", "density", "position", "grips")
 QUESTIONS = {
     "What is built, and by whom?": "scene folder list export order grips props payload "
     "durations robots",
@@ -44,7 +42,7 @@ QUESTIONS = {
     "What counts as best?": "criterion aim rounding speed reference",
     "What must hold?": "stands friction tilt curing limits budgets",
     "What is asked beside verdicts?": "margins map holds",
-    "In which scenarios is it good?": "robust scenarios seed vary",
+    "In which scenarios is it good?": "measure count seed vary",
     "Who chooses and proves, and how long?": "formulation candidates options proof time_limit "
     "workers max_memory",
     "How are responses computed?": "engine mortar tolerance cache",
@@ -57,8 +55,10 @@ PROPS = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma
 FLAGS = {
     "begin": "from",
     "budgets": "budget",
+    "count": "scenarios",
     "criterion": "criteria",
     "limits": "limit",
+    "measure": "robust",
     "options": "option",
     "rounding": "round",
     "rules": "rule",
@@ -72,7 +72,7 @@ VALUES = dict(
         aim=NAME,NAME rules=NAME=VALUE vary=NAME=VALUE options=NAME=VALUE over=NAME=VALUES
         rounding=NAME=STEP limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
         schedule=NAME|FILE begin=PLAN:STEP|N
-        to=PLAN:STEP|N direction=build|take-down robust=AIM scenarios=N seed=N workers=N
+        to=PLAN:STEP|N direction=build|take-down measure=AIM count=N seed=N workers=N
         candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
         cache=DIR at=STEP lost=ROBOT missing=BRICK
         """,
@@ -86,7 +86,7 @@ HOW: dict[str, dict[str, Any]] = {
     "tilt": {"zero": True},
     "robots": {"parse": lambda text: int(text) if text.isdecimal() else named(text)},
     "time_limit": {"zero": True},
-    "scenarios": {"most": MOST},
+    "count": {"most": MOST},
     "seed": {"least": 0, "most": MOST},
     "scene": {"names": builtin_scenes},
     "schedule": {"names": lambda: SCHEDULES},
@@ -94,7 +94,7 @@ HOW: dict[str, dict[str, Any]] = {
     "formulation": {"names": formulation_names},
     "margins": {"names": lambda: MARGINS},
 }  # what a parser knows of options beside their types; names are what help lists
-HIDDEN = ("also", "executor", "made_by")  # that Python alone says
+HIDDEN = ("also", "executor", "made_by", "scenes")  # that Python alone says
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +145,7 @@ class Built:
                 raise FileError(f"{path}: it has no {name}; give a folder of seqopt optimize --out")
         return path
 
-    def read(self, robots: int | Sequence[str] | None = None) -> Scene:
+    def parse(self, robots: int | Sequence[str] | None = None) -> Scene:
         """Return the scene; ``robots``: how many there are, or names, which change nothing."""
         folder, scene = self.folder, self.scene
         if not isinstance(scene, Scene):
@@ -159,10 +159,6 @@ class Built:
             scene = scene.with_props(*parse_props(self.props, scene))
         scene = scene if self.grips is None else with_grips(self.grips, scene)
         return in_seconds(scene, self.durations)
-
-    def parse(self) -> Scene:
-        """Return the scene, as functions of Python take it."""
-        return self.read()
 
 
 ARCH25 = Built()
@@ -222,50 +218,6 @@ class Stands:
         return Standing(mortar, radians(self.tilt or 0.0), cures)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sampled:
-    """Scenarios that are drawn.
-
-    Parameters
-    ----------
-    robust : str
-        What is to be as small as possible over all scenarios, in place of ``formulation``:
-        worst-peak (the largest cost of any step), worst-total (the largest total), or cvar=0.9 (the
-        mean total of the worst tenth).
-    scenarios : int
-        With ``robust``: how many samples of the scene (default: 30).
-    seed : int
-        With ``robust``: which samples are drawn (default: 0).
-    vary : sequence of str
-        With ``robust``: how far samples are from the scene: stiffness=3 (of each joint, by a factor
-        up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 (of
-        each brick and joint, up to so many m); these are the defaults; grips=2 (of grips that are
-        not rigid, by a factor up to it).
-    """
-
-    robust: str | None = None
-    scenarios: int | None = None
-    seed: int = 0
-    vary: Sequence[str] = ()
-
-    def parse(self) -> Robust | None:
-        """Return aim and samples, None where there are none."""
-        for name in ("scenarios", "seed", "vary"):
-            if self.robust is None and getattr(self, name):
-                raise ProblemError(
-                    f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
-                    "worst-total or as cvar=0.9"
-                )
-        if self.robust is None:
-            return None
-        vary = parse_numbers("--vary", self.vary, SPREADS, zero=True, advice=", as stiffness=3")
-        try:
-            aim = parse_robust(self.robust)
-        except ProblemError as error:
-            raise ProblemError(f"--robust: {error}") from error
-        return Robust(aim=aim, vary=vary, count=self.scenarios or Robust.count, seed=self.seed)
-
-
 def parse_count(text: str, where: str, most: int, least: int = 1) -> int:
     """Parse an integer within bounds; ``where``: argument, for messages."""
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
@@ -307,25 +259,6 @@ def with_grips(grips: str, scene: Scene) -> Scene:
         return scene.with_grips(*ways)
     except SceneError as error:
         raise SceneError(f"{where}: {str(error).partition(': ')[2]}") from None
-
-
-def parse_numbers(
-    where: str,
-    texts: Iterable[str],
-    known: Collection[str] | None = None,
-    *,
-    zero: bool = False,
-    advice: str = "",
-) -> dict[str, float]:
-    """Parse positive numbers from ``NAME=VALUE``, by name; by default any name is accepted."""
-    out: dict[str, float] = {}
-    for text in texts:
-        name, value = split_word(text)
-        if known is not None and name not in known:
-            hint, names = did_you_mean(name, known), ", ".join(known)
-            raise ProblemError(f"{where} {text} does not exist{hint}; give one of {names}{advice}")
-        out[name] = number_word(value, f"{where} {text}", zero=zero)
-    return out
 
 
 def parse_mortar(text: str, where: str) -> Mortar:
@@ -375,7 +308,7 @@ SPREAD: dict[str, type] = {
     "scene": Built,
     "schedule": Part,
     "stands": Stands,
-    "robust": Sampled,
+    "robust": Robust,
     "search": Search,
 }
 """By parameter, the class of a value that several words make."""

@@ -144,6 +144,11 @@ def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, 
     assert run(capsys, "analyze", out)[0] == 0
 
 
+def test_samples_alone_ask_for_the_worst_peak(capsys, arch):
+    status, out, _ = run(capsys, "optimize", arch, "--scenarios", "3", "--no-stability")
+    assert (status, "over 3 scenarios (worst-peak)" in out) == (0, True)
+
+
 @pytest.mark.parametrize("aim", ["worst-peak", "cvar=0.5"])
 def test_a_plan_over_scenarios_is_written(capsys, tmp_path, arch, aim):
     words = ("--robust", aim, "--scenarios", "4", "--seed", "5", "--out", tmp_path)

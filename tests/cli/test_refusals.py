@@ -47,7 +47,7 @@ BAD = {
     f"compare {WALL} --speed 9 --reference rigid": "reference 'rigid' does not exist; give one of",
     "optimize ARCH --budget travel=2m --budget travel=0.5": "budget travel=0.5: it stands there",
     # scenarios
-    f"{ROBUST} cvar=2": "--robust: cvar=2.0: give a level",
+    f"{ROBUST} cvar=2": "cvar=2.0: give a level",
     f"{ROBUST} worst-total --formulation minimax": "use scenario_search",
     f"{ROBUST} worst-peak --budget travel=0.8": "where candidates are chosen",
     f"{ROBUST} worst-peak --no-proof": "ask for the proof",
@@ -56,8 +56,8 @@ BAD = {
     f"{ROBUST} worst-peak --vary density=-1": "not a positive number",
     f"{ROBUST} worst-peak --vary grips=2": "they are rigid; say how stiff with --grips",
     f"{FREE} --robust worst-peak --aim sum": "no total of worst states",
-    "optimize SIX --scenarios 3 --formulation minimax": "--scenarios: plans over scenarios",
-    "optimize SIX --seed 3 --schedule free": "--seed: plans over scenarios alone",
+    f"{ROBUST} worst": "robust aim worst does not exist",
+    f"{ROBUST} worst-peak --vary wind=2": "--vary wind=2 does not exist; give one of stiffness",
     # the free schedule
     f"{FREE} --rule newest=never": "rule newest: 'never'; give one of either",
     f"{FREE} --aim speed": "aim 'speed' does not exist",

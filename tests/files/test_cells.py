@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt._files import _FORMULA, csv_text, harmless, plain, rows_text
+from seqopt._files import _FORMULA, csv_text, harmless, plain
 from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from tests.builders import small_arch
@@ -74,9 +74,9 @@ def test_rows_are_written_as_tables_are():
         "jammed": [False, True, True],
     }
     table = pd.DataFrame(columns)
-    assert rows_text(table.to_dict("records")) == csv_text(table)
+    assert csv_text(table.to_dict("records")) == csv_text(table)
     counted = table.assign(share=np.float32(0.1), step=table["step"].astype(np.int64))
     own = [
         dict(zip(counted, row, strict=True)) for row in zip(*map(counted.get, counted), strict=True)
     ]
-    assert rows_text(own) == csv_text(counted)
+    assert csv_text(own) == csv_text(counted)

@@ -21,7 +21,6 @@ from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
@@ -84,7 +83,10 @@ def assess(  # noqa: PLR0913  # every option is a parameter
         known = {"method", "plan"} & {*asked.words} or built.folder
         return _map(asked, map, named(holds), output, progress, known=bool(known))
     output.keep_apart(out)
-    mortars = _mortars(mortar, {} if friction is None else {"friction": friction})
+    own = parse_mortar(mortar or "epoxy", "--mortar")
+    own = own if friction is None else replace(own, friction=friction)
+    shown = (own,) if mortar else (Mortar(friction=own.friction), own)  # the last one decides
+    mortars = {_mortar_name(each): each for each in shown}
     given, rows = asked(progress=progress), list[dict[str, Any]]()
     wanted = find_margins(margins or ()), range(1, len(given.steps) + 1)
     for name, own in mortars.items():
@@ -117,17 +119,6 @@ def _answer(
     return Answer(facts, **said, failures=failures, status=status)
 
 
-def _mortars(mortar: str | None, given: Mapping[str, float]) -> dict[str, Mortar]:
-    """Return mortars by name: the one requested, or dry joints and epoxy.
-
-    The last one decides the exit status. ``given``: properties in place of its own; the friction is
-    that of dry joints as well.
-    """
-    own = replace(parse_mortar(mortar or "epoxy", "--mortar"), **given)
-    dry = () if mortar else (Mortar(friction=own.friction),)
-    return {_mortar_name(each): each for each in (*dry, own)}
-
-
 def _map(
     asked: Call, over: str, holds: Sequence[str], output: Output, tell: Tell, *, known: bool
 ) -> Answer:
@@ -139,7 +130,14 @@ def _map(
     for name in holds:
         parse_mortar(name, "--holds")
     output.require()
-    scene, builds, notes = _builds(asked, tell, known=known)
+    builds: Mapping[str, Sequence[Step]]
+    notes: Sequence[str]
+    if known:
+        given: Sequenced = asked(progress=tell)
+        scene, builds, notes = given.scene, {given.name: given.steps}, given.notes
+    else:
+        scene = asked.values()["scene"].parse(asked.words.get("robots"))
+        builds, notes = MAP.usual_builds(scene, tell)
     found = failure_map(scene, builds, holds, axis, values, tell)
 
     def files() -> dict[str, bytes | str]:
@@ -160,17 +158,6 @@ def _map(
         notes=(*notes, *outputs.figure_notes(written)),
         status=Status.DOES_NOT_HOLD if found.cases["fall"].any() else Status.DONE,
     )
-
-
-def _builds(
-    asked: Call, tell: Tell, *, known: bool
-) -> tuple[Scene, Mapping[str, Sequence[Step]], Sequence[str]]:
-    """Return a scene and the one build that is named, or the usual ones, with notes."""
-    if known:
-        given: Sequenced = asked(progress=tell)
-        return given.scene, {given.name: given.steps}, given.notes
-    scene = asked.values()["scene"].read(asked.words.get("robots"))
-    return (scene, *MAP.usual_builds(scene, tell))
 
 
 def _axis(text: str) -> tuple[str, tuple[float, ...]]:

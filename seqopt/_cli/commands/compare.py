@@ -78,7 +78,7 @@ def compare(  # noqa: PLR0913  # every option is a parameter
     if reference and not speed:
         raise ProblemError("--reference: it values the plans of --speed; give --speed 60 with it")
     check_reference(reference)
-    output, built = Output(out, scene.scene), scene.read(robots)
+    output, built = Output(out, scene.scene), scene.parse(robots)
     find_postures(built, cache, progress)
     computed = find_engine(build_network(built), engine, mortar, verdicts=stability)
     costs = find_criterion(criterion or DEFAULTS["any other"][0])

@@ -22,7 +22,7 @@ from seqopt.judge.arithmetic import first_stage
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import optimize, pose_build
 
-SAID = ("--quiet", "--json")
+OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")
 
 
 def instance(
@@ -64,7 +64,7 @@ def instance(
     progress("computing all that arcs take")
     to = out or Path(re.sub(r"\W+", "-", problem.scene.name).strip("-") + ".npz")
     aim = None if formulation is None else find_formulation(formulation).aim
-    facts = {"made_by": _command_line(made_by)}
+    facts = {"made_by": OUTPUT.sub("", shlex.join(["seqopt", *made_by]))}
     with clock.needed("writing down the graph"):
         found = compile_instance(problem, name=to.stem, aim=aim, below=below, facts=facts)
     progress("writing the instance")
@@ -75,15 +75,3 @@ def instance(
     lines += [f"written to {to}; seqopt judge {to} SOLUTION checks an answer"]
     notes = () if out else (f"file: {to}; --out names another, or a folder for every format",)
     return Answer(found.facts_of(), "\n".join(lines), written=(to,), notes=notes)
-
-
-def _command_line(words: Sequence[str]) -> str:
-    """Return the command line without options of output."""
-    kept = list[str]()
-    left = iter(words)
-    for word in left:
-        if word == "--out":
-            next(left, None)
-        elif word not in SAID and not word.startswith("--out="):
-            kept.append(word)
-    return shlex.join(["seqopt", *kept])

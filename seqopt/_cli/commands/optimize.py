@@ -16,7 +16,7 @@ from seqopt._cli.inputs import find_prover, mortar_of_engine
 from seqopt._cli.outputs import ALWAYS, Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import Folder, Sampled
+from seqopt._cli.words import Folder
 from seqopt._files import csv_text
 from seqopt._later import Later
 from seqopt._showing import PAGE
@@ -32,12 +32,12 @@ from seqopt.sequence.steps import _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work.progress import Tell
-from seqopt.workflow import optimize
+from seqopt.workflow import Robust, optimize
 
 PAGES = Later("seqopt.report._pages")  # 200 ms, where files are written
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
 ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
-SAMPLED = ("robust", "scenarios", "seed", "vary")
+SAMPLED = ("measure", "count", "seed", "vary")
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 
 
@@ -121,8 +121,11 @@ def _report(
     plan: Plan, prover: BuildProver, tables: Mapping[str, object], words: Mapping[str, Any]
 ) -> dict[str, object]:
     """Return the summary with the entries that the command adds."""
-    robust = Sampled(**{name: words[name] for name in SAMPLED if name in words}).parse()
-    drawn = None if robust is None else robust.draw(plan.engine.network.scene).settings
+    drawn = dict[str, object]()
+    if sampled := {name: words[name] for name in SAMPLED if name in words}:
+        robust = Robust(**sampled)
+        settings = robust.draw(plan.engine.network.scene).settings
+        drawn = {"robust": str(robust.measure), "scenarios": settings}
     verdicts = prover.of_builds({plan.title: plan.steps}).get(plan.title, ())
     pictures = sum(name.endswith((".png", ".svg")) for name in tables)
     loop = plan.method == "three-robot" and plan.graph.candidates
@@ -131,7 +134,7 @@ def _report(
         "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
         "stability": {v.mortar: v.facts() for v in verdicts},
         "spent_on_showing": {**prover.spent, "pictures": pictures},
-        **({} if robust is None else {"robust": str(robust.aim), "scenarios": drawn}),
+        **drawn,
     }
 
 

@@ -16,7 +16,7 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.inputs import find_prover, mortar_of_engine
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
-from seqopt._cli.words import Folder, parse_numbers
+from seqopt._cli.words import Folder
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
@@ -35,7 +35,7 @@ from seqopt.sequence.steps import Step
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import INTERRUPT, Clock, Tell
-from seqopt.workflow import optimize, pose_build
+from seqopt.workflow import optimize, parse_numbers, pose_build
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal

@@ -33,7 +33,7 @@ def reach(
     $ seqopt reach my.json --out reach
     $ seqopt reach my.json --cache postures --json
     """
-    found, output = scene.read(), Output(out, scene.scene)
+    found, output = scene.parse(), Output(out, scene.scene)
     output.require()
     if not found.has_arms:
         said = f"no robot of {found.name} has an arm; seqopt scene says how far each reaches"

@@ -18,7 +18,6 @@ from seqopt._cli.words import Built, File, Folder
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.exchange.imports import read_measured
-from seqopt.plan.plan import Plan
 from seqopt.plan.replan import compared
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.quantities import PROP_EXCESS, length_text
@@ -74,8 +73,7 @@ def replan(
     $ seqopt replan free --at 12 --payload rob1=250 --out weaker
     $ seqopt replan free --at 12 --robots 4 --missing 9
     """
-    output, given = Output(out), Built(scene=plan)
-    words = {name: each for name, each in asked.words.items() if each != ()}
+    output, given, words = Output(out), Built(scene=plan), asked.words
     output.require(*ALWAYS)
     scene, steps, summary, notes = _planned(given, words.get("cache"), progress)
     told = _told(summary, lost=bool(words.get("lost")))
@@ -93,7 +91,11 @@ def replan(
         raise InfeasibleError(f"{error}{_with_one_more(again, scene, progress)}") from None
     changes = compared(new, [step for step in steps if step.number > at])
     if measured is not None:
-        changes |= _off(new, scene)
+        planned = {brick.name: brick.position for brick in scene.bricks}
+        bricks = new.engine.network.scene.bricks
+        off, brick = max((math.dist(b.position, planned[b.name]), b.name) for b in bricks)
+        left = float(new.tolerances()["tolerance_mm"].min() / 1000)
+        changes |= {"off_m": off, "off_brick": brick, "tolerance_left_m": left}
     answer = answered(new, prover, output, words, progress)
     return replace(
         answer,
@@ -107,7 +109,7 @@ def _planned(
     given: Built, cache: Path | None, tell: Tell
 ) -> tuple[Scene, tuple[Step, ...], object, tuple[str, ...]]:
     """Return scene, steps and summary of a plan's folder, or of the best free schedule."""
-    scene, summary = given.read(), dict[str, object]()
+    scene, summary = given.parse(), dict[str, object]()
     if given.folder is None:
         plan = Call(optimize, {"scene": scene, "schedule": FREE, "cache": cache})(progress=tell)
         note = f"steps: of the best free schedule, {plan.result}"
@@ -135,15 +137,6 @@ def _with_one_more(asked: Call, scene: Scene, tell: Tell) -> str:
         found = asked(robots=count, progress=tell)
         return f"; or with one more robot that reaches every node: {found.result}"
     return ""
-
-
-def _off(plan: Plan, scene: Scene) -> dict[str, object]:
-    """Return how far a build is from a scene, the farthest brick, and the tolerance of the rest."""
-    planned = {brick.name: brick.position for brick in scene.bricks}
-    built = plan.engine.network.scene.bricks
-    off, brick = max((math.dist(b.position, planned[b.name]), b.name) for b in built)
-    left = float(plan.tolerances()["tolerance_mm"].min() / 1000)
-    return {"off_m": off, "off_brick": brick, "tolerance_left_m": left}
 
 
 def _told(summary: Any, *, lost: bool = False) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def report(
     own = place.is_dir() and (place / "scene.json").is_file()
     if own or not place.is_dir():  # plans go with the scene that stands beside them
         scene = replace(scene, scene=place / "scene.json" if own else folder)
-    network = build_network(scene.read())
+    network = build_network(scene.parse())
     name = re.sub(r"\W+", "-", place.name.removesuffix(".json")).strip("-")
     path = out or (place / PAGE if place.is_dir() else Path(f"{name}.html"))
     outputs.Output(out, scene.scene).keep_apart(path)

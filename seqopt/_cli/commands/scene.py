@@ -46,9 +46,14 @@ def run(
     $ seqopt scene arch25 --export my.json
     """
     if list:
-        return _list(progress)
+        told = with_progress("reading built-in scenes", builtin_scenes(), progress)
+        every = {name: load_scene(name) for name in told}
+        sizes = {n: f"{len(s.bricks)} bricks, {len(s.joints)} joints" for n, s in every.items()}
+        listed = [f"{name}: {size}; {ABOUT[name]}" for name, size in sizes.items()]
+        scenes = [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in every.items()]
+        return Answer({"scenes": scenes, "kinds": KINDS}, "\n".join([*listed, *KINDS.values()]))
     Output(export, scene.scene).keep_apart(export)
-    found = scene.read()
+    found = scene.parse()
     facts = {**scene_facts(found), **_network_facts(build_network(found))}
     lines = [*_described(found, facts)]
     if export is not None:
@@ -75,15 +80,6 @@ def _network_facts(network: Network) -> dict[str, object]:
         "reaches": {n: type(robot.reach).__name__.lower() for n, robot in robots.items()},
         "provenance": scene.provenance,
     }
-
-
-def _list(tell: Tell) -> Answer:
-    told = with_progress("reading built-in scenes", builtin_scenes(), tell)
-    found = {name: load_scene(name) for name in told}
-    sizes = {n: f"{len(s.bricks)} bricks, {len(s.joints)} joints" for n, s in found.items()}
-    lines = (f"{name}: {size}; {ABOUT[name]}" for name, size in sizes.items())
-    scenes = [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()]
-    return Answer({"scenes": scenes, "kinds": KINDS}, "\n".join([*lines, *KINDS.values()]))
 
 
 def _grip(robot: Robot | Prop) -> str:

@@ -69,7 +69,7 @@ def times(
 
     def files() -> dict[str, bytes | str]:
         texts = {name: csv_text(table()) for name, table in tables.items()}
-        return {**texts, **outputs.time_files(build)}
+        return {**texts, **outputs.picture("times", lambda _: build.gantt())}
 
     where = "--out DIR writes when every step happens, and a chart of it"
     if written := output.write(progress, files):
