@@ -83,7 +83,7 @@ def replan(
     built = scene if measured is None else _as_measured(scene, measured, site.bricks)
     begin = _Place(site, done) if given.folder is None else f"{plan}:{at}"
     rules = (*told.get("rules", ()), *words.get("rules", ()))
-    words = told | words | {"scene": built, "schedule": FREE, "begin": begin, "rules": rules}
+    words = {**told, **words, "scene": built, "schedule": FREE, "begin": begin, "rules": rules}
     again = Call(optimize, words)
     try:
         new, prover = find(again, progress, stability=stability)
