@@ -64,12 +64,8 @@ def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Float
     """
     slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
     each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
-    return np.asarray(np.add.reduceat(each, first_points(bed.face, len(moduli)), axis=0))
-
-
-def first_points(face: Ints, faces: int) -> Ints:
-    """Return the first point of every face, from the ascending faces (P,) of points."""
-    return np.searchsorted(face, np.arange(faces))
+    firsts = np.searchsorted(bed.face, np.arange(len(moduli)))  # faces of points ascend
+    return np.asarray(np.add.reduceat(each, firsts, axis=0))
 
 
 _STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
@@ -94,7 +90,8 @@ class ElasticLimits(FrozenValue):
         shear = np.sqrt(stress[..., 1] ** 2 + stress[..., 2] ** 2)
         sliding = shear - mortar.cohesion - mortar.friction * stress[..., 0]
         beyond = np.maximum(-stress[..., 0] - mortar.tensile_strength, sliding)
-        most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)
+        firsts = np.searchsorted(face, np.arange(wrench.shape[1]))
+        most = np.maximum.reduceat(beyond, firsts, axis=1)
         return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
 
     def exceeded(self, wrench: Floats) -> Bools:

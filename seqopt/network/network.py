@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seqopt._later import Later
 from seqopt._showing import Shown, display
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
@@ -22,10 +21,7 @@ from seqopt.scene._checks import units
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
-    import networkx as nx
     from matplotlib.figure import Figure
-
-nx = Later("networkx")  # 120 ms, where connectivity is asked
 
 _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
@@ -299,16 +295,3 @@ class Network(Shown, FrozenValue):
         """Draw the network, or its part of the first ``bricks``, in build order."""
         figure: Figure = display(Network, "plot")(self, bricks)
         return figure
-
-    def bodies(self, bricks: int) -> nx.Graph[int]:
-        """Return the graph of bricks and ground of a partial structure, connected by springs.
-
-        Bricks are indices in build order, the ground is `GROUND`. A spring without stiffness is no
-        edge.
-        """
-        graph: nx.Graph[int] = nx.Graph()
-        springs = self.springs
-        graph.add_nodes_from([*range(bricks), GROUND])
-        ties = (springs.since <= bricks) & springs.stiffness.any(axis=1)
-        graph.add_edges_from(springs.bodies[ties].tolist())
-        return graph

@@ -358,7 +358,9 @@ class Problem(Shown):
     @property
     def schedule(self) -> Schedule:
         """The schedule whose grips are open; a `ProblemError` where rules say what can be done."""
-        return self.moves.scheduled()
+        if isinstance(self.moves, Schedule):
+            return self.moves
+        raise ProblemError("the free schedule has no open grips; it has states")
 
     @classmethod
     def asked(

@@ -273,18 +273,14 @@ def _read(kind: type, given: Any, where: str) -> Any:
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return a scene as the document of a file, without defaults."""
-    kinds = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
+    kinds: dict[Any, dict[str, str]] = {cls: {"kind": kind} for kind, cls in _REACHES.items()}
 
-    def entry(part: Any) -> dict[str, Any]:
-        out: dict[str, Any] = {**kinds.get(type(part), {})}
-        for each in fields(part):
-            value = getattr(part, each.name)
-            if value != each.default or each.name in _SAID:
-                several = isinstance(value, tuple) and value and is_dataclass(value[0])
-                out[each.name] = tuple(map(entry, value)) if several else value
-                if is_dataclass(value):
-                    out[each.name] = entry(value)
-        return out
+    def entry(value: Any) -> Any:
+        if not is_dataclass(value):
+            return tuple(map(entry, value)) if isinstance(value, tuple) else value
+        given = [(each, getattr(value, each.name)) for each in fields(value)]
+        said = [(f.name, own) for f, own in given if own != f.default or f.name in _SAID]
+        return {**kinds.get(type(value), {}), **{name: entry(own) for name, own in said}}
 
     return {**_HEADER, **entry(scene)}
 

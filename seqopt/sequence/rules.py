@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
-from typing import NoReturn
 
 import numpy as np
 
 from seqopt.arrays import Bools, Ints
-from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.errors import StepError, did_you_mean
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
@@ -179,10 +178,6 @@ class FreeRules:
         ``stands``: whether it is asked where states must stand.
         """
         return self.payload is Payload.KEPT
-
-    def scheduled(self) -> NoReturn:
-        """Raise a `ProblemError`: rules say what can be done."""
-        raise ProblemError("the free schedule has no open grips; it has states")
 
     def relaxed(self, scene: Scene) -> tuple[str, ...]:
         """Return the default rule that is relaxed because few robots take part, in words."""

@@ -56,8 +56,7 @@ class Near:
     def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
         """Select the nodes that are near at a brick count, or else the nearest ones."""
         placed = scene.build_order[:bricks]
-        graph = nx.Graph(joint.bricks for joint in scene.joints).subgraph(placed)
-        graph = nx.Graph(graph)
+        graph = nx.Graph(j.bricks for j in scene.joints if {*j.bricks} <= {*placed})
         graph.add_nodes_from(placed)
         joints = nx.multi_source_dijkstra_path_length(graph, {*placed[-_NEWEST:]})
         away = {n: joints.get(scene.brick_of_node[n].name, math.inf) for n in nodes}
@@ -187,10 +186,6 @@ class Schedule(Shown):
         """Return the number of last steps that only release against rules: zero, without rules."""
         return 0
 
-    def scheduled(self) -> Schedule:
-        """Return itself: whose grips are open."""
-        return self
-
     def free(self) -> NoReturn:
         """Raise a `ProblemError`: steps are given."""
         raise ProblemError(
@@ -289,12 +284,15 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
 def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
     """Return the bricks of every part of a partial structure without joints to a ground end."""
     springs, placed = network.springs, network.scene.placed
-    at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
+    ties = springs.stiffness.any(axis=1)
+    at_once = ties & (springs.since == springs.bodies[:, 1] + 1)
     if len(np.unique(springs.bodies[at_once, 1])) == len(placed):  # each to what stood before
         return ()
-    names = [brick.name for brick in placed]
-    parts = nx.connected_components(network.bodies(bricks))
-    return tuple(frozenset(names[i] for i in part) for part in parts if GROUND not in part)
+    graph = nx.Graph()
+    graph.add_nodes_from([*range(bricks), GROUND])
+    graph.add_edges_from(springs.bodies[ties & (springs.since <= bricks)].tolist())
+    parts = nx.connected_components(graph)
+    return tuple(frozenset(placed[i].name for i in part) for part in parts if GROUND not in part)
 
 
 def check_support(

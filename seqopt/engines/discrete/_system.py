@@ -17,7 +17,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact._elastic_limits import face_quadrature, first_points, opening_maps
+from seqopt.contact._elastic_limits import face_quadrature, opening_maps
 from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import BedStiffness, Mortar
@@ -116,7 +116,7 @@ class System(FrozenValue):
 
     @property
     def _starts(self) -> Ints:
-        return first_points(self.face, len(self.acting))
+        return np.searchsorted(self.face, np.arange(len(self.acting)))
 
 
 def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
