@@ -77,25 +77,20 @@ class Waits:
 
     def soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest | None:
         """Return who of a kind acts so that a plan takes least; None if no wait is enough."""
+        space, scene = problem.space, problem.network.scene
+        waits = None if self._builds is None else self._builds.waits
+        kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
+        place = {node: i for i, node in enumerate(space.network.scene.placed_nodes, start=1)}
+        asked = scene, space.steps(states), lambda r, hold: kind[r] == kind[hold.robot]
+        begin = problem.rules.begin
         try:
-            return self._soonest(problem, states)
+            steps = reassigned_steps(*asked, [*kind], waits, begin=begin)
+            times: tuple[StepTime, ...] = step_times(scene, steps, waits, begin)
         except StepError:
             if self.cuts is None:
                 raise
             return None
-
-    def _soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest:
-        space, scene = problem.space, problem.network.scene
-        waits = None if self._builds is None else self._builds.waits
-        kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
-        steps = reassigned_steps(
-            *(scene, space.steps(states), lambda r, hold: kind[r] == kind[hold.robot]),
-            *([*kind], waits),
-            begin=problem.rules.begin,
-        )
-        place = {node: i for i, node in enumerate(space.network.scene.placed_nodes, start=1)}
         grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
-        times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
         starts = () if waits is None else tuple(time.start for time in times)
         return Soonest(grips, times[-1].end, starts)
 

@@ -176,15 +176,10 @@ class Stages:
         found = Chosen(swept.path, swept.best, prices.bound)
         if found.value > prices.bound * (1 + ALMOST):
             found = self._least(carrying, stage, found, prices, self._watch)
-        if not found.path and found.late:
-            raise StopError("time")
-        if not found.path:
-            if found.bound < np.inf:
-                raise NothingFoundError(
-                    "no plan within all budgets was found; take makespan_labels"
-                )
-            raise InfeasibleError("no plan is within all budgets")
+        if not (found.path or found.late) and found.bound < np.inf:
+            raise NothingFoundError("no plan within all budgets was found; take makespan_labels")
         stage.path, stage.late = found.path, found.late
+        stage.require_path()
         stage.bounds.append(min(found.bound, found.value))
         stage.proofs.append(self._proof(found.labels, prices))
         stage.caps = replace(stage.caps, time=tied(found.value))

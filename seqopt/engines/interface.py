@@ -271,12 +271,7 @@ class NamedEngine:
     """Base of engines, with a representation that names engine and structure."""
 
     def __init__(self, network: Network | Scene) -> None:
-        self._network = network_of(network)
-
-    @property
-    def network(self) -> Network:
-        """The network whose nodes and edges the fields follow."""
-        return self._network
+        self.network = network_of(network)  # whose nodes and edges the fields follow
 
     def __repr__(self) -> str:
         scene = self.network.scene

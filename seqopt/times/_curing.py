@@ -70,10 +70,7 @@ some times, and for which joint it waits; empty if for none."""
 
 
 class CuringBuilds:
-    """Proven earliest times at which states stand with the bonds that their joints then have.
-
-    ``asked``: how many states were looked at, each with bonds.
-    """
+    """Proven earliest times at which states stand with the bonds that their joints then have."""
 
     def __init__(self, network: Network, mortar: Mortar, curing: Curing) -> None:
         self.network, self.joints = network, JointsInTime(network, curing)
@@ -83,7 +80,6 @@ class CuringBuilds:
             lambda bricks, grips: self._parts(bricks, grips).with_bond(self._bond), mortar
         )
         self._found: dict[tuple[int, Grips, bytes], tuple[Verdict, Floats | None]] = {}
-        self.asked = 0
 
     def verdict(self, bricks: int, grips: Grips, bond: Floats) -> tuple[Verdict, Floats | None]:
         """Return whether a state stands with shares of bond (j,), and in which motion it falls.
@@ -94,7 +90,6 @@ class CuringBuilds:
         if key not in self._found:
             self._bond = bond
             assembly, proven, _ = self._chain(bricks, grips)
-            self.asked += 1
             found, motion = _verdict_of(proven), None
             if found is Verdict.FALLS:
                 scales = np.repeat([1.0, assembly.scales[1]], 3)

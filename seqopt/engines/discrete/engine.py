@@ -50,7 +50,7 @@ class DiscreteEngine(OpeningEngine):
         self._systems: dict[int, System] = {}
 
     def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance) -> Fields:
-        network = self._network
+        network = self.network
         require_resistance(network, bricks, columns, compliance)
         if bricks not in self._systems:
             self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)

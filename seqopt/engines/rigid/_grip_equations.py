@@ -172,12 +172,7 @@ def well_conditioned(
 
 
 def share_pairs(
-    operator: ComplianceOperator,
-    columns: Ints,
-    index: Ints,
-    force: Floats,
-    carried: Floats,
-    pairs: Pairs | None = None,
+    operator: ComplianceOperator, index: Ints, force: Floats, carried: Floats, pairs: Pairs
 ) -> None:
     """Let each of two grips on one brick take the force at its own node.
 
@@ -187,7 +182,6 @@ def share_pairs(
     ``force`` (S, k), ``carried`` (S, E), (S, 0): of grips and edges, changed in place, N; where
     there are none of edges, they are computed. Others: as of `grip_forces`.
     """
-    pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     if not len(pairs.sets):
         return
     sets, edges = pairs.sets, operator.maps.inner[0][pairs.brick]
@@ -195,8 +189,8 @@ def share_pairs(
         between = carried[sets, edges]
         carried[sets, edges] = 0.0
     else:
-        found = operator.answer("edge_force", index[sets], force[sets])
-        between = found[np.arange(len(sets)), edges]
+        found = operator.answers(["edge_force"], index[sets], force[sets])
+        between = found["edge_force"][np.arange(len(sets)), edges]
     shift, nodes = between[:, None] * pairs.axis, operator.by_grip(force)[..., :3]
     nodes[sets, pairs.first] += shift
     nodes[sets, pairs.second] -= shift

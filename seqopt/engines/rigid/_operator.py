@@ -254,10 +254,6 @@ class ComplianceOperator(FrozenValue):
             for name in names
         }
 
-    def answer(self, name: str, index: Ints, force: Floats) -> Floats:
-        """Return one of these fields."""
-        return self.answers((name,), index, force)[name]
-
     def _mapped(self, name: str, index: Ints, force: Floats) -> Floats:
         """Return a field of sets whose twists and wrenches are summed first."""
         states = self._states(name)

@@ -109,7 +109,7 @@ class _FastSolution:
             found[name] = (
                 flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
             )
-        share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
+        share_pairs(operator, self.index, force, found["edge_force"], self.pairs)
         borne = operator.by_grip(force)
         found["grip_force"] = borne[..., :3]
         found["grip_moment"] = np.zeros((*columns.shape, 3))
@@ -128,7 +128,7 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
         rows, pull = index[start : start + _CHUNK], force[start : start + _CHUNK]
         held = rows[:, :, None], rows[:, None]
         parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
-        left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
+        left = np.abs(operator.answers(["displacement"], rows, pull)["displacement"]).max(axis=1)
         out[start : start + _CHUNK] = parts.max(axis=1) > _CANCEL * left
     return out
 
@@ -163,14 +163,14 @@ class ComplianceEngine(NamedEngine):
         moved: ArrayLike | None = None,
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
-        columns = grip_columns(self._network, bricks, grips)
-        compliance = read_compliance(self._network, columns, grips, moved)
+        columns = grip_columns(self.network, bricks, grips)
+        compliance = read_compliance(self.network, columns, grips, moved)
         found = self._found(bricks, columns, compliance, want)
         return require_finite(found, bricks, grips)
 
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
-        size = len(self._network.inner)
+        size = len(self.network.inner)
         if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
                 last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
@@ -202,8 +202,8 @@ class ComplianceEngine(NamedEngine):
         ``compiled``: whether by compiled loops, where numba is there and sets are few beside the
         nodes; else they are taken from the fields.
         """
-        columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
-        compliance = read_compliance(self._network, columns, numbers, None)
+        columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
+        compliance = read_compliance(self.network, columns, numbers, None)
         if not compiled or not compliance.rigid or not can_compile():
             fields = self._found(bricks, columns, compliance, want)
             return extremes_in(require_finite(fields, bricks, numbers), want)
@@ -211,7 +211,7 @@ class ComplianceEngine(NamedEngine):
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         large = bricks <= min(self._uniform, len(self._tree.spring))
         large = large and not are_few(3 * bricks, len(columns))
-        moves = large and (self._network.springs.movement.any() or self._builder.moments)
+        moves = large and (self.network.springs.movement.any() or self._builder.moments)
         if large and not moves and self._builder.growth.bricks <= bricks:
             if self._grown is None:
                 self._grown = GrownExtremes(self._builder)
@@ -249,18 +249,18 @@ class ComplianceEngine(NamedEngine):
     @cached_property
     def _shared(self) -> Shared:
         """What the systems that correct answers are cut from."""
-        return share(self._network)
+        return share(self.network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
-        return OperatorBuilder(self._network, self._tree)
+        return OperatorBuilder(self.network, self._tree)
 
     @cached_property
     def _frontal(self) -> FrontalSystem:
         from seqopt.engines.rigid._frontal import FrontalSystem  # noqa: PLC0415  # large scenes only
 
-        return FrontalSystem(self._network)
+        return FrontalSystem(self.network)
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
@@ -272,7 +272,7 @@ class ComplianceEngine(NamedEngine):
         operator = self._operator(bricks, columns) if tied else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
+                self._refinement = Refinement(self.network, bricks, self._shared, tied=tied)
             last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
