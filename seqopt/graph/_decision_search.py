@@ -10,16 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from seqopt.arrays import Floats, Terse
-from seqopt.engines.interface import Fields, Want
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import NothingFoundError, TimeUpError
 from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import Watch
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
-from seqopt.responses.table import step_fields
-from seqopt.sequence.schedule import OpenGrip
-from seqopt.sequence.steps import Step
 from seqopt.work._workers import keep
 
 
@@ -27,13 +22,12 @@ from seqopt.work._workers import keep
 class Windows(Terse):
     """The steps that every move decides, after the choice before it; solved when first asked for.
 
-    ``choice``: the chosen candidate of every move so far; ``fields``: by number, of steps that an
-    engine had at hand on the way; ``rows``: by move, the steps that are solved.
+    ``choice``: the chosen candidate of every move so far; ``rows``: by move, the steps that are
+    solved.
     """
 
     problem: Decisions
     choice: list[int] = field(default_factory=list)
-    fields: dict[int, Fields] = field(default_factory=dict, compare=False)
     rows: dict[int, tuple[StepChoices, ...]] = field(default_factory=dict, compare=False)
 
     def row(self, move: int) -> tuple[StepChoices, ...]:
@@ -66,7 +60,7 @@ def walk_windows(problem: Decisions, watch: Watch) -> Windows:
     others may have led on; `TimeUpError` if time is over before the last move is chosen;
     `WorkerError`; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
     """
-    found, noted, resources = Windows(problem), 0, problem.evaluation.resources
+    found, resources = Windows(problem), problem.evaluation.resources
     try:
         with keep(resources.executor, resources.workers):
             for k, move in enumerate(problem.schedule.moves):
@@ -80,25 +74,6 @@ def walk_windows(problem: Decisions, watch: Watch) -> Windows:
                         "choices"
                     )
                 found.choice.append(int(np.argmin(costs)))
-                noted = _note_fields(found, noted)
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(found.so_far()) from stop
     return found
-
-
-def _note_fields(found: Windows, noted: int) -> int:
-    """Keep all fields of steps that are chosen, where an engine has them at hand; count these."""
-    problem, choice = found.problem, found.choice
-    engine, moves = problem.engine, problem.schedule.moves
-    for step in problem.schedule.steps[noted:]:
-        if any(move >= len(choice) for move in step.moves):
-            break
-        noted += 1
-        if isinstance(engine, ComplianceEngine) and engine._recalls(step.bricks):
-            nodes = (
-                moves[g.move].candidates[choice[g.move]] if isinstance(g, OpenGrip) else g
-                for g in step.grips
-            )
-            known = Step(step.number, step.kind, step.bricks, tuple(nodes))
-            found.fields[step.number] = step_fields(engine, known, Want.ALL)
-    return noted

@@ -370,18 +370,14 @@ class Proof:
         Which are asked is of no account: without those that fall, no end may be reached.
         """
         rebuilt = self.rebuilt(Filter(), hinted=False)
-        graph, firsts = rebuilt.graph(), np.cumsum([0, *map(len, rebuilt.states)])
+        graph = rebuilt.graph()
         known = np.zeros(graph.states, dtype=np.int64)
         known[0] = PASSES
 
         def ask(_: int, states: Ints) -> Ints:
             return np.where(rebuilt.may_stand(states, margins), PASSES, FAILS)
 
-        def known_before(part: int, states: Ints) -> Ints:
-            rows = rebuilt.states[part][states - firsts[part]]
-            return rebuilt.evaluators[part].known_to_stand(rebuilt.levels[part], rows, margins)
-
-        _lazy_path(graph, rebuilt.part_of(), known, ask, known_before)
+        _lazy_path(graph, rebuilt.part_of(), known, ask, lambda _, states: known[states])
         left = reached(graph, (known != FAILS)[graph.target])
         self.states = max(self.states, int(left.sum()))
         return not graph.ends[left].any()

@@ -23,7 +23,7 @@ from seqopt.judge._proof import BELOW, Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._states import largest_load
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins
-from seqopt.judge._twin import PathTwin, exceeds, own_values, twin_of
+from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.judge.certificate import TOLERANCE, Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.resources import StepArrays, _first_fault
@@ -65,7 +65,8 @@ def judge_schedule(
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     by_labels, proves = problem.is_timed or bool(problem.paths), bool(selection.proofs)
     if problem.is_timed:
-        proves = _path_twin(problem) is not None and bool(np.isfinite(selection.bound).any())
+        twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
+        proves = twin is not None and bool(np.isfinite(selection.bound).any())
     is_claimed = not proves and (selection.stopped or by_labels)
     bounds: Bounds = (-np.inf,) * len(problem.goals)  # they are claimed alone
     with suppress(TooManyPartsError):
@@ -125,11 +126,6 @@ def _proven(
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     bounds = (*bounds, *values[aims:])
     return Certificate(values, bounds, gap, left, {}, proof.states, proof.models, Basis.REBUILT)
-
-
-def _path_twin(problem: States) -> PathTwin | None:
-    """Return the twin of the goal that is about times; None if there is none."""
-    return next((goal.twin for goal in problem.goals if goal.in_time), None)
 
 
 def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:

@@ -5,7 +5,7 @@ Nothing that a search keeps is believed; what this judge computed once for a gri
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -235,26 +235,14 @@ class StateEvaluator:
         """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
         (held, payload), out = self.held_to_stand(states), np.ones(len(states), dtype=bool)
         bricks = self.tables.bricks_at(level)
-        for known in self._stability(margins) if bricks else ():  # an empty site stands
-            out[out] = known.may_stand(bricks, held[out], payload[out])
-        return out
-
-    def known_to_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
-        """Return cached verdicts (n,): 1 stands, -1 falls, 0 open."""
-        (held, payload), bricks = self.held_to_stand(states), self.tables.bricks_at(level)
-        if not bricks:
-            return np.ones(len(held), dtype=np.int64)
-        known = [each.recalled(bricks, held, payload) for each in self._stability(margins)]
-        return np.asarray(np.min(known, axis=0))
-
-    def _stability(self, margins: Sequence[float]) -> Iterator[StandingSets]:
-        """Yield the verdicts of every stability requirement, scenario by scenario."""
-        for demand in self.demands(margins):
+        for demand in self.demands(margins) if bricks else ():  # an empty site stands
             if demand not in self._standing:
                 networks = [p.network for p in self.problem.each or (self.problem,)]
                 sets = (StandingSets(network, demand, self._loads) for network in networks)
                 self._standing[demand] = tuple(sets)
-            yield from self._standing[demand]
+            for known in self._standing[demand]:
+                out[out] = known.may_stand(bricks, held[out], payload[out])
+        return out
 
     def held_to_stand(self, states: Ints) -> tuple[Ints, Floats]:
         """Return places held, ascending, and the largest forces there, where states must stand."""

@@ -292,29 +292,19 @@ Way = tuple[str, str, States]  # the filter that is loosened, how in words, and 
 
 
 def _remedies(problem: States, look: Look, *, finished: bool) -> str:
-    """Describe the relaxations that are enough, alone or else two of them, as the end of a line.
+    """Describe the relaxations that are enough, each alone, as the end of a line.
 
     ``finished``: whether the finished structure fails, which nobody holds: no robot helps.
     """
-    ways = [*_ways(problem, look, finished=finished)]
-    found = [_enough(problem, look, *way) for way in ways]
-    if not finished and all(name == "arms" for name, *_ in ways):
-        (rules,) = (each for each in problem.every_filter if each.name == "rules")
-        pairs = (
-            f"{text} together with {other}" + f" (--rule {text} --rule {other})" * (name == "rules")
-            for text, relaxed in rules.ways(problem)
-            for name, other, _ in _ways(relaxed, look)
-            if not (ways and name == "arms")
-        )
-        found += [pair for pair in [next(pairs, "")] if pair]
-    if found:
+    ways = _ways(problem, look, finished=finished)
+    if found := [_enough(problem, look, *way) for way in ways]:
         return f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
     if finished:
         return "; no robot helps: it needs more bond or friction, less load, or other limits"
-    return ", even if two rules or limits are loosened; extend a reach or add a robot"
+    return ", whichever rule or limit is loosened; extend a reach or add a robot"
 
 
-def _ways(problem: States, look: Look, *, finished: bool = False) -> Iterator[Way]:
+def _ways(problem: States, look: Look, *, finished: bool) -> Iterator[Way]:
     """Yield every single relaxation that is enough; of each filter, and each rule, only the least.
 
     Payloads are not asked where no state is held within them, and every robot bears its brick.

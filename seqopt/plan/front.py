@@ -80,10 +80,6 @@ class FrontProblem:
     def __repr__(self) -> str:
         return f"<FrontProblem of {self._problem}>"
 
-    def anew(self) -> FrontProblem:
-        """Return a copy with an empty cache for a formulation, which may change it."""
-        return FrontProblem(replace(self._problem), self._rounding)
-
     @property
     def names(self) -> tuple[str, ...]:
         """The goals."""
@@ -234,7 +230,7 @@ def find_front(
         front = _front_of(posed, formulation, left, progress, watch)
 
         pairs = zip(front.engines, front.steps, strict=True)
-        moved = tuple(most_moved(engine, steps, {}) for engine, steps in pairs)
+        moved = tuple(most_moved(engine, steps) for engine, steps in pairs)
         return replace(front, moved=moved)
 
     def farthest(front: Front) -> Moved | None:  # all of its plans keep the range, or none can
@@ -249,7 +245,8 @@ def _front_of(
     """Return the Pareto set of a problem, its points recomputed, with the proof of completeness."""
     start, name = time.perf_counter(), formulation.name
     limit = min(seconds, clock.left)
-    solve = partial(formulation.solve, problem.anew(), seconds=limit, progress=progress)
+    own = FrontProblem(replace(problem._problem), problem._rounding)  # which it may change
+    solve = partial(formulation.solve, own, seconds=limit, progress=progress)
     with clock.needed("finding a first plan"):
         found = _found(name, problem, solve)
     solved = time.perf_counter()

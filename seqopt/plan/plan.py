@@ -303,11 +303,8 @@ class Plan(ShownBuild):
 
     @cached_property
     def _columns(self) -> _Columns:
-        met = {} if self.search is None else self.search.fields
-        new = (step for step in self.steps if step.number not in met)
-        others = _each_fields(self.engine, new, Want.ALL)
-        fields = (met.get(step.number) or next(others) for step in self.steps)
         # of all fields, which what steps leave is judged by too
+        fields = _each_fields(self.engine, self.steps, Want.ALL)
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
         columns.update(self._of_scene.step_columns(self.steps))

@@ -127,10 +127,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         if asked.scene.has_arms:
             plan = from_arms("with_postures")(asked, plan, solved)
 
-        known = {} if plan.search is None or plan.graph.scenarios else plan.search.fields
-
-        engines = plan.graph.scenarios or (plan.engine,)
-        each = (most_moved(engine, plan.steps, known) for engine in engines)
+        each = (most_moved(own, plan.steps) for own in plan.graph.scenarios or (plan.engine,))
         return replace(plan, moved=max(each, key=lambda moved: moved.share))
 
     def interrupted(plan: Plan) -> Plan:

@@ -28,7 +28,6 @@ from seqopt.responses.quantities import CHOSEN_BY, OFFERED, PROP_EXCESS, TOLERAN
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.scene._armed import go_together
-from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Grips, Step
 from seqopt.work._workers import free_memory, keep
@@ -220,23 +219,13 @@ def _sets_of(schedule: Schedule, step: OpenStep, chosen: Mapping[int, int]) -> _
             columns.append(np.int64(grip))
     rows = np.stack([np.broadcast_to(column, shape).ravel() for column in columns], axis=1)
     possible = (np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1)  # a node each
-    possible &= _for_arms(scene, step, rows)
+    if scene.has_arms:
+        nodes_in_order = scene.placed_nodes
+        order = np.argsort(nodes_in_order)
+        places = np.zeros((len(rows), len(scene.robots)), dtype=np.int64)
+        places[:, [*held]] = 1 + order[np.searchsorted(nodes_in_order, rows, sorter=order)]
+        possible &= go_together(scene, step.bricks, places)
     return _Sets(shape, [*held], possible, scene.grip_kinds.numbers(rows[possible], [*held]))
-
-
-def _for_arms(scene: Scene, step: OpenStep, rows: Ints) -> Bools:
-    """Return which choices (P,) of a step are feasible for arms.
-
-    ``rows`` (P, r): nodes held, by the robots that hold any, in their order.
-    """
-    if not scene.has_arms:
-        return np.ones(len(rows), dtype=bool)
-    nodes = scene.placed_nodes
-    order = np.argsort(nodes)
-    held = np.zeros((len(rows), len(scene.robots)), dtype=np.int64)
-    robots = [robot for robot, grip in enumerate(step.grips) if grip is not None]
-    held[:, robots] = 1 + order[np.searchsorted(nodes, rows, sorter=order)]
-    return go_together(scene, step.bricks, held)
 
 
 def _work(schedule: Schedule, steps: Iterable[OpenStep], *, last: bool = False) -> float:

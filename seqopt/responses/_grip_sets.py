@@ -6,7 +6,7 @@ For searches that need few of many sets: the sets of a request are solved in bat
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Engine, Fields, linear_limit
+from seqopt.engines.interface import Engine, linear_limit
 from seqopt.errors import MechanismError
 from seqopt.responses._blocks import BLOCK, COMPILED, Answers, Block, answer, packed, unpacked, work
-from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.steps import Step
 from seqopt.work._workers import hire, map_ordered
@@ -216,21 +215,14 @@ class Moved(NamedTuple):
     step: int
 
 
-def most_moved(engine: Engine, steps: Sequence[Step], known: Mapping[int, Fields]) -> Moved:
-    """Return the largest displacement of any node in any step.
-
-    ``known``: fields of steps, by number. Of others only displacements are computed, in single
-    precision, in batches of equal numbers of bricks and grips.
-    """
-    scene, moved = engine.network.scene, RESPONSES["D_max"]
+def most_moved(engine: Engine, steps: Sequence[Step]) -> Moved:
+    """Return the largest displacement of any node in any step, in single precision."""
+    scene = engine.network.scene
     alike = defaultdict[tuple[int, int], dict[tuple[int, ...], int]](dict)
     far = linear_limit(scene)
     found = [Moved(0.0, 0)]
     for step in steps:
-        if step.number in known:
-            shift = moved.of(engine.network, known[step.number])
-            found.append(Moved(float(shift[0]) / far, step.number))
-        elif step.bricks:
+        if step.bricks:
             grips = scene.grip_numbers(step.grips, step.bricks)
             alike[step.bricks, len(grips)].setdefault(grips, step.number)
     for (bricks, count), numbers in alike.items():

@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import half_circle
 from seqopt._cli.main import main
-from seqopt.engines.rigid._extremes import can_compile
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import (
     InfeasibleError,
@@ -33,8 +31,6 @@ from seqopt.network.build import build_network
 from seqopt.plan.solve import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _choices as batches
-from seqopt.responses import _grip_sets
-from seqopt.responses.table import analyze
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
@@ -232,25 +228,6 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
     able = np.isfinite(costs)
     assert own[able] == pytest.approx(costs[able])
     assert other.tolist() != own.tolist()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not can_compile(), reason="no numba")
-@pytest.mark.xdist_group("compiled loops")
-def test_the_search_answers_steps_on_its_way(monkeypatch):
-    """Large structures grow once for a plan and its table."""
-    monkeypatch.setattr(_grip_sets, "COMPILED", 0.0)
-    network = half_circle(60)
-    engine, known = ComplianceEngine(network), three_robot_loop(network)
-    plan = solve(pose_decisions(engine, known, EQUATIONS), "cascade", proof=False)
-    late = {step.number for step in plan.steps if step.bricks > 40}
-    assert late <= plan.search.fields.keys() | {plan.steps[-1].number}
-    found, fresh = plan.responses(), analyze(ComplianceEngine(network), plan.steps)
-    for column in fresh.select_dtypes("number"):
-        a, b = (table[column].to_numpy(float) for table in (found, fresh))
-        assert np.allclose(
-            a, b, rtol=0, atol=1e-9 * max(np.nanmax(np.abs(b)), 1e-9), equal_nan=True
-        )
 
 
 @pytest.mark.parametrize(

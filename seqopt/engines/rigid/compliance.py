@@ -223,10 +223,6 @@ class ComplianceEngine(NamedEngine):
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
 
-    def _recalls(self, bricks: int) -> bool:
-        """Return whether fields of a brick count come from the data grown for extremes."""
-        return self._grown is not None and self._builder.growth.recalls(bricks)
-
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
         return max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
