@@ -218,7 +218,7 @@ def _sets_of(schedule: Schedule, step: OpenStep, chosen: Mapping[int, int]) -> _
         else:
             columns.append(np.int64(grip))
     rows = np.stack([np.broadcast_to(column, shape).ravel() for column in columns], axis=1)
-    possible = (np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1)  # a node each
+    possible = np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))  # a node each
     if scene.has_arms:
         nodes_in_order = scene.placed_nodes
         order = np.argsort(nodes_in_order)
