@@ -30,7 +30,7 @@ PALE = "#f2efe9"  # of a grip whose force is not known
 DARK, CURES = "#222222", "#f3dcc0"
 PREPARED: Any = {"fc": "#e8e8e8", "ec": DARK, "hatch": "///"}
 LANE = 0.74  # height of a bar, of a lane's
-SIZES = {"steps": (0.13, 6.0, 1.6, 1.2), "seconds": (0.15, 7.0, 1.8, 1.3)}
+STEP, LEAST, BESIDE, ABOVE = 0.14, 6.5, 1.7, 1.25
 """Inches: of a step, of a chart at least, beside the bars, above and below them."""
 WIDEST, LETTER = 30.0, 0.06  # inches: of a chart, of a letter
 Clock = tuple[Waits | None, Site | None]
@@ -113,11 +113,10 @@ def _lanes(
     if times is not None:
         ends = np.array([0.0, *(time.end for time in times)])
     left, right = float(ends[first - begins]), float(ends[last - begins + 1])
-    per_step, least, beside, above = SIZES["steps" if times is None else "seconds"]
-    width = float(np.clip(per_step * (last - first + 1) + beside, least, WIDEST))
-    figure = new_picture(width, 0.62 * count + above)
+    width = float(np.clip(STEP * (last - first + 1) + BESIDE, LEAST, WIDEST))
+    figure = new_picture(width, 0.62 * count + ABOVE)
     axes = figure.add_subplot()
-    inch = (width - beside) / (right - left or 1.0)
+    inch = (width - BESIDE) / (right - left or 1.0)
     shade, colors = None, None
     if responses is not None:  # N, by step and robot
         forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)

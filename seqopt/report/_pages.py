@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, count
@@ -149,21 +149,17 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
     tables: list[tuple[str, pd.DataFrame | bytes]] = []
-    tables += [] if result.speed is None else _speed_parts(result.speed)
+    if (speed := result.speed) is not None:
+        title = f"Speed against regret, valued by {speed.reference}"
+        with suppress(ExtraError):
+            draw = display(RegretTable, "plot")
+            from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
+
+            tables.append((title, picture_files("", draw(speed))[".png"]))
+        tables.append((f"{title}, in numbers. {speed.sentence}", speed.table))
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
     return _page(engine, builds, sentence, tables)
-
-
-def _speed_parts(speed: RegretTable) -> Iterator[tuple[str, pd.DataFrame | bytes]]:
-    """Yield speed against accuracy as a picture, where matplotlib is installed, and a table."""
-    title = f"Speed against regret, valued by {speed.reference}"
-    with suppress(ExtraError):
-        draw = display(RegretTable, "plot")
-        from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
-
-        yield title, picture_files("", draw(speed))[".png"]
-    yield f"{title}, in numbers. {speed.sentence}", speed.table
 
 
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:

@@ -199,18 +199,15 @@ def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
         return {}
     if found is None:
         return {}
-    table, cell, posed = found.table, Cell(scene), dict[int, PosedArm]()
-    out = dict[str, list[Floats | PosedArm | None]]()
+    cell, joints = Cell(scene), found.table.joints
+    posed, out = dict[int, PosedArm](), dict[str, list[Floats | PosedArm | None]]()
     for r, robot in enumerate(scene.robots):
-        if robot.arm is None:
-            continue
-        own = out.setdefault(robot.name, [])
-        for step, rows in zip(steps, found.steps, strict=True):
+        for step, rows in zip(steps, found.steps, strict=True) if robot.arm else ():
             row, node = rows[r], step.grips[r]
-            if row is not None:
-                own.append(posed.setdefault(row, PosedArm(robot.arm, table.joints[row])))
-            else:
-                own.append(idle[robot.name] if node is None else cell.arm(robot, node))
+            arm = idle[robot.name] if node is None else cell.arm(robot, node)
+            if row is not None and robot.arm is not None:
+                arm = posed.setdefault(row, PosedArm(robot.arm, joints[row]))
+            out.setdefault(robot.name, []).append(arm)
     return out
 
 
@@ -220,14 +217,13 @@ def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, obje
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
     robot's among them, or -1.
     """
-    cell, places, known = Cell(scene, given), dict[str, int](), {id(None): -1}
+    cell, places = Cell(scene, given), {id(None): -1}
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):
         row = cell.arms(step, s)
         for arm in row:
-            if id(arm) not in known and arm is not None:
-                line = _line(arm).round(4).tolist()
-                known[id(arm)] = places.setdefault(str(line), len(lines))
-                lines += [line] * (len(places) - len(lines))
-        at.append([known[id(arm)] for arm in row])
+            if arm is not None and id(arm) not in places:
+                places[id(arm)] = len(lines)
+                lines.append(_line(arm).round(4).tolist())
+        at.append([places[id(arm)] for arm in row])
     return {"lines": lines, "at": at}

@@ -151,8 +151,8 @@ def compare(
         gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
         rows[PUBLISHED] |= {"problem": problem.schedule.method, "objective": value, "gap": gap}
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
-    if not tables and free is None:  # whose refusal says most
-        raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
+    if not tables and free is None:  # the first refusal says most
+        raise type(refused[0])(f"{refused[0]}; {why[0]}")
     measured = None
     if speed:
         how: dict[str, Any] = {"seconds": speed, "reference": reference, "progress": progress}
@@ -268,7 +268,7 @@ def _row(plan: Plan) -> dict[str, object]:
 
 def method_tables(
     engine: Engine, robots: Sequence[str] = ()
-) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError | MechanismError]]:
+) -> tuple[dict[str, pd.DataFrame], list[str], list[StepError | MechanismError]]:
     """Return the responses of every method without open grips, and of the published plan.
 
     Parameters
@@ -283,22 +283,21 @@ def method_tables(
     tables : dict of str to pandas.DataFrame
         By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
     notes : list of str
-        Why other methods cannot build the scene or are not what they are called, and which robots
-        never grip.
-    refused : dict of str to StepError or MechanismError
-        Why each method that is left out is.
+        First why other methods cannot build the scene; then which are not what they are called,
+        and which robots never grip.
+    refused : list of StepError or MechanismError
+        Why methods are left out.
     """
     scene = engine.network.scene
-    tables: dict[str, pd.DataFrame] = {}
-    refused: dict[str, StepError | MechanismError] = {}
-    notes: list[str] = []
-    built: dict[str, tuple[Step, ...]] = {}
+    tables, built = dict[str, pd.DataFrame](), dict[str, tuple[Step, ...]]()
+    refusals, notes, refused = list[str](), list[str](), list[StepError | MechanismError]()
     for name, method in METHODS.items():
         try:
             steps = method(engine.network, robots[:2])
             tables[name] = analyze(engine, steps)
         except (StepError, MechanismError) as error:
-            refused[name] = error
+            refusals.append(f"{name}: not possible here; {error}")
+            refused.append(error)
             continue
         if alike := [other for other, own in built.items() if own == steps]:
             notes.append(f"{name}: it is the {alike[0]} method here")
@@ -306,7 +305,6 @@ def method_tables(
         notes += _idle_note(scene, name, steps)
     if tables and (known := published_about(scene)) is not None:
         tables[PUBLISHED] = analyze(engine, known.steps)
-    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
     return tables, refusals + notes, refused
 
 

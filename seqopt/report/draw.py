@@ -244,7 +244,14 @@ def draw_grips(
     for i, (x, y) in at.items():
         robot = scene.robots[i].name
         name = f"{robot} at {grips[i]}"
-        mark: Any = {**grip_mark(i), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
+        mark: Any = {
+            **grip_mark(i),
+            "ms": 10.5,
+            "mec": "white",
+            "mew": 0.8,
+            "ls": "none",
+            "zorder": 5,
+        }
         axes.plot([x], [y], **mark, gid=name)
         key[i] = Line2D([], [], **mark, label=f"{robot} holds")
         if named:  # labels of neighbors stand in lines, one above the other

@@ -262,16 +262,6 @@ def report_page(
     of some builds are left out, and the page says so, where there are more than `MOST` numbers.
     ``scatter``: title and points of a chart, a row per build and a column for every quantity that
     an axis may show, in words and with its unit; the first two are shown first.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> from seqopt.report.page import Build
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine, steps = seqopt.make_engine("compliance", network), seqopt.sequential(network)
-    >>> build = Build("sequential", steps, seqopt.analyze(engine, steps))
-    >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
-    True
     """
     chart: dict[str, object] = {}
     if scatter is not None:
