@@ -89,20 +89,19 @@ class _Search:
                 return [], f"{names[-1]} {lacks} posture ({why})"
         for k, own in enumerate(options):
             longer = [(*way, row) for way in ways for row in own if self._free(way, row)]
-            if not longer:
-                return [], f"{self._in_the_way(names, options, k)} are in each other's way"
+            if not longer:  # two if two cannot hold together, else all up to this one
+                apart = (
+                    (names[i], names[j])
+                    for i, j in combinations(range(k + 1), 2)
+                    if not any(self._free((a,), b) for a in options[i] for b in options[j])
+                )
+                those = next(apart, (", ".join(names[:k]), names[k]))
+                return [], f"{' and '.join(those)} are in each other's way"
             ways = longer[:_MOST_WAYS]
         return ways, ""
 
     def _free(self, way: _Way, row: int) -> bool:
         return not any(self._table.collide[row, other] for other in way)
-
-    def _in_the_way(self, names: Sequence[str], options: Sequence[list[int]], last: int) -> str:
-        """Return which robots cannot hold together: two if two cannot, else all up to the last."""
-        for i, j in combinations(range(last + 1), 2):
-            if not any(self._free((a,), b) for a in options[i] for b in options[j]):
-                return f"{names[i]} and {names[j]}"
-        return ", ".join(names[:last]) + f" and {names[last]}"
 
     def _traced(
         self, kept: Sequence[dict[_Way, _Way | None]]
