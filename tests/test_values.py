@@ -24,7 +24,7 @@ from seqopt.engines.rigid._mechanism import share, ungripped_system
 from seqopt.engines.rigid._mixed import Solution, mixed_system
 from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.exchange.contacts import flat_face, touching_faces
+from seqopt.exchange.contacts import touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces
@@ -51,11 +51,11 @@ def values(arch25):
     proven = Prover(assembly, _compiled())(bonded(assembly, seqopt.EPOXY))
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     cube = box((1, 1, 1))
-    (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
+    ((_, touching),) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),
         *_faces(np.array(cube.vertices), cube),
-        *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
+        *(touching, Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, seqopt.EPOXY)),
         *(tree, operator, operator.doubts, parts, share(network)),

@@ -40,29 +40,18 @@ def _placed(source: str, held: Entry, elements: dict[str, tuple[str, Entry]]) ->
 
     Its own is relative to its parent in the tree, and the first of them to the model's.
     """
+    own = {
+        guid: transformation_of(f"{where}: transformation", item.get("transformation"))
+        for guid, (where, item) in elements.items()
+    }
     world = transformation_of(f"{source}: transformation", held.get("transformation"))
     placed = dict[str, Floats]()
     for guid, parent in _tree(source, held):
         if guid not in elements or guid in placed:
             why = "occurs twice" if guid in placed else "is not there"
             raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
-        placed[guid] = (world if parent is None else placed[parent]) @ _own(*elements[guid])
-    lost = {guid: world @ _own(*elements[guid]) for guid in elements.keys() - placed.keys()}
-    return placed | lost
-
-
-def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
-    """Yield serialized objects, which stand by their identifiers or in a list, with these."""
-    listed = not isinstance(found, dict)
-    for key, item in enumerate(listing(where, found)) if listed else found.items():
-        held = mapping(f"{where} {key}", item)
-        yield str(held.get("guid", key) if listed else key), held
-
-
-def _own(where: str, held: Entry) -> Floats:
-    """Return the transformation of an element to its parent; early ones have a frame too."""
-    frame = transformation_of(f"{where}: frame", held.get("frame"))
-    return frame @ transformation_of(f"{where}: transformation", held.get("transformation"))
+        placed[guid] = (world if parent is None else placed[parent]) @ own[guid]
+    return {guid: world @ each for guid, each in own.items()} | placed
 
 
 def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
@@ -130,17 +119,19 @@ def read_model(document: Any, source: str) -> Content:
                 f"{source}: the problem does not hold its model; give the model itself"
             )
         held = held_by(f"{source}: model", held["model"])
-    rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
+    rows = mapping(f"{source}: elements", entry(source, held, "elements"))
     where = [f"{source}: element {i}" for i in range(len(rows))]
-    elements = {g: (at, held_by(at, item)) for at, (g, item) in zip(where, rows, strict=True)}
+    elements = {
+        guid: (at, held_by(at, item)) for at, (guid, item) in zip(where, rows.items(), strict=True)
+    }
     placed = _placed(source, held, elements)
-    items = by_guid(f"{source}: materials", held.get("materials") or [])
-    found = {guid: held_by(source, item).get("density") for guid, item in items}
+    items = mapping(f"{source}: materials", held.get("materials") or {})
+    found = {guid: held_by(source, item).get("density") for guid, item in items.items()}
     densities = {
         g: number(f"{source}: density", value) for g, value in found.items() if value is not None
     }
     blocks = list[FileBlock]()
-    for i, (guid, item) in enumerate(rows):
+    for i, (guid, item) in enumerate(rows.items()):
         if kind(item) != "group":
             at, own = elements[guid]
             vertices, faces = solid_of(at, entry(at, own, "geometry", "shape"))

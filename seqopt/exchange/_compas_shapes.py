@@ -99,9 +99,6 @@ def transformation_of(where: str, value: Any) -> Floats:
     if value is None:
         return np.eye(4)
     held = payload(value)
-    if isinstance(held, dict) and "matrix" not in held and "point" in held:
-        origin, axes = frame_of(where, held)
-        return np.vstack([np.column_stack([axes.T, origin]), np.eye(4)[3]])
     rows = listing(where, held.get("matrix", held) if isinstance(held, dict) else held)
     matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
     if [len(row) for row in matrix] != [4] * 4:

@@ -96,15 +96,6 @@ _Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
 _Facets = tuple[list[Floats], Floats, Floats]  # corners of faces, normals outward, and middles
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _TouchingFace(FrozenValue):
-    """A convex face between two blocks."""
-
-    blocks: tuple[int, int]  # places of the blocks, ascending
-    corners: Floats  # (m, 3); once around, m
-    normal: Floats  # (3,); unit vector from the first block into the second
-
-
 def _require_polygons() -> None:
     if find_spec("shapely") is None:
         raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
@@ -112,12 +103,13 @@ def _require_polygons() -> None:
 
 def touching_faces(
     shapes: Sequence[_Shape], gap: float, progress: Tell | None = None
-) -> tuple[_TouchingFace, ...]:
-    """Return the faces over which blocks touch, in the order of the blocks.
+) -> tuple[_Held, ...]:
+    """Return pairs of places of blocks that touch, and the face over which they do, in their order.
 
     Two blocks touch where a face of one lies on a face of the other: normals against each other,
     and no more than a gap between the planes anywhere in the overlap. What overlaps in one plane is
-    united and cut into convex pieces, each a face of its own, halfway between the two.
+    united and cut into convex pieces, each a face of its own, halfway between the two; its normal
+    points from the first block into the second.
 
     ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
     which they may interpenetrate, m; ``progress``: called with how far it is, once it takes longer
@@ -133,7 +125,7 @@ def touching_faces(
         normals = units(np.array([normal_of(face) for face in corners]))
         facets.append((corners, normals, np.array([face.mean(axis=0) for face in corners])))
     course, done = Progress("finding faces", len(shapes), progress), 0
-    out = list[_TouchingFace]()
+    out = list[_Held]()
     near = _near_pairs([_bounds_of(shape.points) for shape in shapes], gap)
     for tries, (i, j) in enumerate(near):
         course.add(i - done)
@@ -142,7 +134,7 @@ def touching_faces(
             raise SceneError(f"more than {_MOST_PAIRS} pairs of blocks are in one place; part them")
         for origin, axes, polygons in _overlaps(facets[i], facets[j], gap):
             for piece in _convex_pieces(polygons):
-                out.append(_TouchingFace((i, j), origin + piece @ axes[1:], axes[0]))
+                out.append(((i, j), flat_face(origin + piece @ axes[1:], axes[0])))
     return tuple(out)
 
 
@@ -270,9 +262,8 @@ def _find_contacts(
     facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
     said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = list[_Held]()
-    for found in touching_faces(facets, gap, given.progress):
-        face = flat_face(found.corners, found.normal)
-        a, b = (i if i in bricks else GROUND for i in found.blocks)
+    for pair, face in touching_faces(facets, gap, given.progress):
+        a, b = (i if i in bricks else GROUND for i in pair)
         if b == GROUND != a:
             turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
             faces.append(((GROUND, a), turned))

@@ -34,6 +34,7 @@ QUICK = ("bridge",)
 OTHERS = {*SAMPLES} - {"armadillo_cra", "snake", *QUICK}
 SLOW = [pytest.param(n, marks=pytest.mark.slow) for n in sorted(OTHERS)]
 SMALL = [*QUICK, *SLOW, SNAKE]
+CURVED = {"curve-3-blocks", "cube-curve-short", "cube-curve-tall"}  # files have faces of the curves
 
 
 theirs_of = cache(sample_scene)
@@ -61,7 +62,8 @@ def test_blocks_and_faces_are_those_of_compas_cra(name):
     volume = sum(brick.mass for brick in scene.bricks) / 2000.0
     assert volume == pytest.approx(theirs.volume, rel=2e-3)  # faces that are not flat
     area = sum(flat_face(touch.corner).area for touch in theirs.touches)
-    assert structure(scene).area.sum() == pytest.approx(area, rel=1e-6)
+    near = 2e-3 if name in CURVED else 1e-6
+    assert structure(scene).area.sum() == pytest.approx(area, rel=near)
 
 
 @pytest.mark.parametrize("name", ["bridge", SNAKE])

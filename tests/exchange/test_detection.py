@@ -29,14 +29,14 @@ GAP = 1e-3
 
 
 def areas(shapes, gap=GAP):
-    return {f.blocks: flat_face(f.corners, f.normal).area for f in touching_faces(shapes, gap)}
+    return {blocks: face.area for blocks, face in touching_faces(shapes, gap)}
 
 
 def test_boxes_on_boxes():
     low, high = box((2, 1, 1)), box((2, 1, 1), at=(0.5, 0.25, 1.0))
-    (face,) = touching_faces([low, high], GAP)
-    assert face.normal == pytest.approx([0, 0, 1])
-    found = flat_face(face.corners, face.normal)
+    ((blocks, found),) = touching_faces([low, high], GAP)
+    assert blocks == (0, 1)
+    assert found.axes[0] == pytest.approx([0, 0, 1])
     assert found.area == pytest.approx(1.5 * 0.75)
     assert found.center == pytest.approx([1.25, 0.625, 1.0])
     assert found.moments == pytest.approx((1.5 * 0.75**3 / 12, 0.75 * 1.5**3 / 12))
@@ -59,7 +59,7 @@ def test_a_face_that_is_not_convex_is_cut_into_pieces_that_are():
         shapes = [prism(outline), prism(outline, at=(0, 0, 1))]
         faces = touching_faces(shapes, GAP)
         assert 2 <= len(faces) <= 3
-        flats = [flat_face(face.corners, face.normal) for face in faces]
+        flats = [flat for _, flat in faces]
         assert sum(flat.area for flat in flats) == pytest.approx(area)
         assert all(face_joint((1, 2), flat, MASONRY).face for flat in flats)
 
