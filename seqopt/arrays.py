@@ -44,11 +44,13 @@ class Terse:
 
     def __repr__(self) -> str:
         own = vars(type(self)).get("__annotations__", {})  # before those of a base
-        shown = [
-            f"{field.name}={_short(getattr(self, field.name))}"
-            for field in sorted(fields(self), key=lambda field: field.name not in own)  # type: ignore[arg-type]
-            if field.repr and not _is_default(getattr(self, field.name), field.default)
-        ]
+        plain = (str, int, float, tuple, type(None), Enum)
+        shown = []
+        for field in sorted(fields(self), key=lambda field: field.name not in own):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            usual = field.default is not MISSING and isinstance(value, plain)
+            if field.repr and not (usual and value == field.default):
+                shown.append(f"{field.name}={_short(value)}")
         ends = accumulate(len(text) + 2 for text in shown)
         kept = max(1, sum(end <= _LONGEST for end in ends))
         more = [f"and {len(shown) - kept} more"] if kept < len(shown) else []
@@ -145,12 +147,6 @@ def _hashable(content: object) -> object:
     if isinstance(content, list | tuple):
         return tuple(map(_hashable, content))
     return "NaN" if _is_nan(content) else content
-
-
-def _is_default(content: object, default: object) -> bool:
-    """Return whether a field has its default value."""
-    plain = (str, int, float, tuple, type(None), Enum)
-    return default is not MISSING and isinstance(content, plain) and bool(content == default)
 
 
 def _short(content: object) -> str:

@@ -11,11 +11,10 @@ from seqopt._cli.words import ARCH25, Built, parse_mortar
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import DEFAULT, LIMITED, USUAL, make_engine, simplest
+from seqopt.engines.registry import DEFAULT, LIMITED, make_engine, simplest
 from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS
@@ -40,11 +39,6 @@ class Sequenced(NamedTuple):
     def scene(self) -> Scene:
         """What is built."""
         return self.network.scene
-
-    def build(self, standing: Standing | None = None) -> GivenSequence:
-        """Return it with the engine that knows least."""
-        engine = make_engine(USUAL, self.network)
-        return GivenSequence(engine, self.steps, self.name, standing=standing)
 
 
 def read_steps(

@@ -80,7 +80,13 @@ def replan(
     if told.get("direction") and words.get("missing"):
         raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
-    built = scene if measured is None else _as_measured(scene, measured, site.bricks)
+    built, stand = scene, scene.build_order[: site.bricks]
+    if measured is not None:
+        found = read_measured(scene, measured)
+        if early := [name for name in found if name in scene.build_order and name not in stand]:
+            why = f"brick {early[0]} does not stand yet; leave it out"
+            raise StepError(f"--measured {measured}: {why}")
+        built = as_built(scene, found)
     begin = _Place(site, done) if given.folder is None else f"{plan}:{at}"
     rules = (*told.get("rules", ()), *words.get("rules", ()))
     words = {**told, **words, "scene": built, "schedule": FREE, "begin": begin, "rules": rules}
@@ -117,15 +123,6 @@ def _planned(
     with suppress(FileError):
         summary = parse_json(read_text(given.folder / "summary.json"), "summary")
     return scene, read_plan(scene, given.folder / "plan.csv"), summary, ()
-
-
-def _as_measured(scene: Scene, file: Path, bricks: int) -> Scene:
-    """Return a scene with its standing bricks where they were measured."""
-    found, stand = read_measured(scene, file), scene.build_order[:bricks]
-    if early := [name for name in found if name in scene.build_order and name not in stand]:
-        why = f"brick {early[0]} does not stand yet; leave it out"
-        raise StepError(f"--measured {file}: {why}")
-    return as_built(scene, found)
 
 
 def _with_one_more(asked: Call, scene: Scene, tell: Tell) -> str:

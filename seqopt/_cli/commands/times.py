@@ -14,6 +14,7 @@ from seqopt._cli.words import Folder, in_seconds
 from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
 from seqopt.contact.mortar import Mortar
+from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
@@ -104,7 +105,8 @@ def _build(
             "--stands: here it goes with --curing of mortar that has a bond; seqopt assess says "
             "what stands"
         )
-    build = named.build(standing)
+    engine = make_engine(USUAL, named.network)
+    build = GivenSequence(engine, named.steps, named.name, standing=standing)
     try:
         given = float(build.times()["end_s"].iloc[-1])
     except StepError as error:
