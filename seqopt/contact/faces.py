@@ -281,18 +281,14 @@ class PartialAssemblies:
         levers = np.linalg.norm(fields["grip_position"] - own, axis=1)
         longest = max(self._lever[:corners].max(initial=0.0), levers.max(initial=0.0))
         scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
+        columns = self._map.indptr[: 3 * corners + 1]
+        kept = slice(0, int(columns[-1]))
+        ratio = np.where(self._turning[kept], whole.scales[1] / scales[1], 1.0)  # of levers
+        entries = self._map.data[kept] * ratio, self._map.indices[kept], columns
         return Assembly.cut(
             **{name: getattr(whole, name)[:end] for end, names in ends for name in names},
             **fields,
             bond=np.zeros(0),
             scales=scales,
-            contact_map=self._map_of(6 * bricks, 3 * corners, scales[1]),
+            contact_map=sparse.csc_array(entries, shape=(6 * bricks, 3 * corners)).tocsr(),
         )
-
-    def _map_of(self, rows: int, columns: int, lever: float) -> sparse.csr_array:
-        """Return the first columns of the whole's map, its moments over another lever."""
-        ends = self._map.indptr[: columns + 1]
-        kept = slice(0, int(ends[-1]))
-        ratio = np.where(self._turning[kept], self._whole.scales[1] / lever, 1.0)
-        entries = self._map.data[kept] * ratio, self._map.indices[kept], ends
-        return sparse.csc_array(entries, shape=(rows, columns)).tocsr()

@@ -141,11 +141,6 @@ class Curing(Terse):
     def __post_init__(self) -> None:
         settle(self, points=_checked("curing", self.points))
 
-    @property
-    def is_instant(self) -> bool:
-        """Whether joints have their full bond from the first."""
-        return self.points[:1] == ((0.0, 1.0),)
-
     def __str__(self) -> str:
         if self.points and self.points == _linear(self.points[-1][0]):
             return f"{self.points[-1][0]:g}s"

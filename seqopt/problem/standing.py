@@ -59,7 +59,8 @@ class Standing:
             curing, mortar = _find_curing(self.curing), self.mortar
             mortar = mortar if curing.points else Mortar(friction=mortar.friction)
             bonded = mortar.tensile_strength or mortar.cohesion
-            settle(self, mortar=mortar, curing=curing if bonded and not curing.is_instant else None)
+            bonded = bonded and curing.points[:1] != ((0.0, 1.0),)  # not all of it from the first
+            settle(self, mortar=mortar, curing=curing if bonded else None)
         if self.curing is not None and self.tilt:
             raise ProblemError("tilt: it is not modeled while mortar cures; leave one of them out")
         if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):

@@ -210,7 +210,7 @@ class FreeRules:
 
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of the placed bricks that may be gripped."""
-        nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+        nodes = scene.placed_nodes[: 2 * bricks]
         if not self.candidates or not nodes:
             return frozenset(nodes)
         return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
