@@ -6,7 +6,8 @@ space can be explored level by level, whole batches of states at a time, and onl
 needs it (`seqopt.graph._explore.Explorer`). Three spaces are built in
 `seqopt.graph.states.explored`: the open grips of a schedule, free rules, and all orders of the
 bricks, where a part is a set of bricks. Anything with the members below is explored, solved and
-judged in the same way: a puzzle without bricks is, in `tests/formulations/test_toy_space.py`.
+judged in the same way: a puzzle without bricks is, in
+`tests/formulations/test_free_formulations.py`.
 """
 
 from __future__ import annotations

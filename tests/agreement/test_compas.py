@@ -79,20 +79,6 @@ def test_too_little_friction_falls_for_both():
     assert mine.verdict is force_only(theirs_of("bridge"), 0.05).verdict is Verdict.FALLS
 
 
-@pytest.mark.long
-@pytest.mark.slow
-def test_armadillo_on_its_true_faces():
-    """366 blocks on 33 supports, 1,014 faces."""
-    scene, friction = imported("armadillo_cra"), SAMPLES["armadillo_cra"].friction
-    found = structure(scene)
-    assert (len(scene.bricks), len(found.area)) == (366, 1014)
-    sizes = sum(flat_face(touch.corner).area for touch in sample_scene("armadillo_cra").touches)
-    assert found.area.sum() == pytest.approx(sizes, rel=1e-5)
-    mine = assess(found, Mortar(friction=friction))
-    assert mine.verdict is force_only(sample_scene("armadillo_cra"), friction).verdict
-    assert mine.verdict is Verdict.STANDS
-
-
 def test_a_plan_goes_back_into_the_assembly(tmp_path):
     """COMPAS loads it; blocks stay, and every one that is built says when."""
     scene = imported("bridge")

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
+import signal
 from dataclasses import replace
+from functools import partial
 
 import pandas as pd
 import pytest
 
 import seqopt
+from seqopt._cli.arguments import request
 from seqopt._cli.main import main
+from seqopt.errors import TimeUpError
+from seqopt.plan import _answers as _paths
+from seqopt.plan import _states
 from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.work.progress import INTERRUPT, TIME, Clock
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
@@ -61,3 +70,111 @@ def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, 
     assert start in capsys.readouterr().err
     assert main(["assess", ARCH, *words[1:]]) == 0
     assert "movement" not in capsys.readouterr().err
+
+
+# a limit of time, and an interrupt, wherever a command is: what is there is not lost
+
+
+WALL = "wall:columns=2,courses=2"
+FREE = ("optimize", WALL, "--schedule", "free", "--aim", "minmax,steps")
+LOOP = ("optimize", WALL, "--formulation", "overlap_dp")
+
+
+def ended(words, when, how=KeyboardInterrupt):
+    """Run a command that is ended as it says that it begins with something; return its answer.
+
+    As ``how``: an interrupt, or the end of the time, which comes between two instructions too.
+    """
+    told = []
+
+    def tell(what):
+        told.append(str(what))
+        if when in told[-1] and sum(when in each for each in told) == 1:
+            raise how
+
+    answer = request([*map(str, words)]).answer(tell)
+    assert any(when in each for each in told)
+    return answer
+
+
+def in_the_midst(monkeypatch, module, name, how):
+    """Let a function of a module end as if time were over in it."""
+
+    def ends(*_, **__):
+        raise how
+
+    monkeypatch.setattr(module, name, ends)
+
+
+@pytest.mark.parametrize(
+    ("words", "module", "judge", "how", "status"),
+    [
+        (FREE, _states, "judge_schedule", TimeoutError, 0),
+        (LOOP, _paths, "judge_path", KeyboardInterrupt, 130),
+    ],
+)
+def test_a_proof_that_is_ended_leaves_what_is_claimed(
+    tmp_path, monkeypatch, words, module, judge, how, status
+):
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert main([*words, "--out", str(whole)]) == 0
+    in_the_midst(monkeypatch, module, judge, how)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
+    assert main([*words, "--out", str(out)]) == status
+    known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
+    assert found["objective"] == pytest.approx(known["objective"])
+    assert found["bound"] == pytest.approx(known["bound"])
+    assert (found["gap"], known["gap"]) == (None, 0)
+    assert found["ended"] == ("interrupted" if status else "stopped")
+    scene = seqopt.load_scene(out / "scene.json")
+    assert read_plan(scene, out / "plan.csv") == read_plan(scene, whole / "plan.csv")
+
+
+@pytest.mark.parametrize("words", [LOOP, ("pareto", WALL), ("instance", WALL)])
+def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, words):
+    """Whatever comes first, and where nothing is late the same words have an answer."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
+    assert main([*words, "--time-limit", "0"]) == 4
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("seqopt: time is over: ")
+    assert [*tmp_path.iterdir()] == []
+    with pytest.raises(TimeUpError, match="takes longer; give more"), Clock(0.0).needed("all"):
+        pass
+
+
+def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
+    words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
+    answer = ended(words, "1 plans found")
+    assert answer.status == 130
+    assert not answer.facts["complete"]
+    assert len(answer.facts["points"]) == 1
+    with pytest.raises(KeyboardInterrupt):  # nothing is there that could be lost
+        ended(words, "0 plans found")
+
+
+def test_a_limit_is_of_search_and_proof_alone(tmp_path, monkeypatch):
+    """Verdicts, tables and page are made although the time is over."""
+    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert main([*LOOP, "--out", str(whole)]) == 0
+    assert main([*LOOP, "--time-limit", "0", "--out", str(out)]) == 0
+    assert {path.name for path in whole.iterdir()} == {path.name for path in out.iterdir()}
+    known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
+    assert (known["ended"], found["ended"]) == ("done", "stopped")
+    assert {*found["stability"]} == {"dry", "epoxy"}
+
+
+def test_a_clock_ends_what_is_late_and_says_why(monkeypatch):
+    clock = Clock(100.0)
+    assert clock.tried(lambda: 3) == (3, "")
+    assert (clock.late, 0 < clock.left <= 100.0) == (False, True)
+    with pytest.raises(KeyboardInterrupt), clock.needed("b"):
+        signal.raise_signal(signal.SIGINT)
+    assert clock.tried(partial(signal.raise_signal, signal.SIGINT)) == (None, INTERRUPT)
+    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
+    assert Clock(0.0).tried(lambda: 3) == (None, TIME)
+    assert [clock.why(stopped) for stopped in (INTERRUPT, "memory", "")] == [
+        *(INTERRUPT, "memory", "")
+    ]

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
 
 import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.errors import InfeasibleError, StepError
+from seqopt._registry import ADDED, COMMANDS, every_command
+from seqopt.errors import InfeasibleError, PluginWarning, ProblemError, StepError
 from seqopt.sequence.rules import FreeRules
+from tests.commands import command
 from tests.commands import command as run
 
 WALL = "wall:columns=2,courses=2"
@@ -91,3 +95,132 @@ def test_a_payload_that_is_enough_for_a_free_schedule(asked):
     (newton,) = said(refusal(make, 20.0), r"a payload of (\d+) N \(--payload \1\)")
     assert make(float(newton)).steps
     refusal(make, float(newton) - 1)
+
+
+# commands of packages and users: a function whose signature and docstring say its options
+
+
+def weigh(
+    scene: str = "arch25", *, per: str = "scene", least: float = 0.0, names: tuple[str, ...] = ()
+):
+    """Say what the bricks of a scene weigh.
+
+    Parameters
+    ----------
+    scene : SCENE
+        what is weighed
+    per : WORD
+        scene, or brick for a table
+    least : KG
+        leave out lighter bricks
+    names : NAME
+        bricks to weigh
+
+    Examples
+    --------
+    seqopt weigh arch25 --per brick
+    """
+    found = seqopt.load_scene(scene)
+    weights = {str(brick.name): brick.mass for brick in found.placed if brick.mass >= least}
+    weights = {name: each for name, each in weights.items() if not names or name in names}
+    if per == "brick":
+        return pd.DataFrame({"brick": [*weights], "kg": [*weights.values()]})
+    return f"{found.name}: {len(weights)} bricks weigh {sum(weights.values()):.4g} kg"
+
+
+WEIGH = seqopt.Command("weigh", weigh)
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Install a package that has a command, by its entry point."""
+
+    def install(entry):
+        info = tmp_path / "my_package-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[seqopt.parts]\nweigh = {entry}\n")
+        monkeypatch.syspath_prepend(tmp_path)
+
+    return install
+
+
+def test_a_package_adds_a_command(package, capsys):
+    package(f"{__name__}:WEIGH")
+    assert "    weigh     Say what the bricks of a scene weigh." in command(capsys, "--help")[1]
+    page = command(capsys, "weigh", "--help")[1]
+    assert "usage: seqopt weigh [SCENE] [options]" in page
+    assert "--least KG" in page
+    assert "seqopt weigh arch25 --per brick" in page
+    scene = "chain:bricks=7"
+    assert command(capsys, "weigh", scene)[1] == "chain 7: 7 bricks weigh 25.62 kg\n"
+    words = ("--per", "brick", "--names", "1", "--names", "3")
+    table = command(capsys, "weigh", scene, *words)[1].splitlines()
+    assert (table[0], len(table)) == ("brick,kg", 3)
+    assert '"text": "chain 7' in command(capsys, "weigh", scene, "--json")[1]
+    status, _, said = command(capsys, "weigh", "arch26")
+    assert (status, said.count("\n")) == (2, 1)
+    for wrong, said in (
+        (("weigh", "--least", "x"), "--least: 'x' is not a positive number"),
+        (("weigh", "--leest", "1"), "did you mean --least?"),
+        (("weig",), "did you mean weigh?"),
+    ):
+        assert said in command(capsys, *wrong)[2]
+
+
+def test_a_package_that_fails_is_left_out(package, capsys):
+    package("nothing_of_this_name:WEIGH")
+    with pytest.warns(PluginWarning, match="plug-in nothing_of_this_name:WEIGH"):
+        status, page, _ = command(capsys, "--help")
+    assert (status, "weigh" in page) == (0, False)
+    assert command(capsys, "scene", "chain:bricks=7")[2] == ""  # nobody asks for plug-ins there
+
+
+@pytest.fixture
+def alone():
+    """Forget what a test registers."""
+    before = {**ADDED}
+    yield
+    ADDED.clear()
+    ADDED.update(before)
+
+
+def count(
+    folder: Path,
+    *,
+    kind: Literal["all", "odd"] = "all",
+    most: Annotated[int, {"least": 0, "most": 5}] = 3,
+    loud: bool = False,
+):
+    """Count.
+
+    Parameters
+    ----------
+    folder : DIR
+        where
+    kind : CHOICE
+        which
+    most : N
+        up to
+    loud :
+        say it louder
+    """
+    return f"{folder.name} {kind} {most}{'!' * loud}"
+
+
+@pytest.mark.usefixtures("alone")
+def test_a_function_is_registered_as_a_command(capsys, tmp_path):
+    seqopt.register(seqopt.Command("count", count))
+    assert {*every_command()} == {*COMMANDS, "count"}
+    assert command(capsys, "count", tmp_path / "a", "--loud")[1] == "a all 3!\n"
+    assert command(capsys, "count", tmp_path, "--most", "0", "--kind", "odd")[0] == 0
+    assert "from 0 to 5" in command(capsys, "count", tmp_path, "--most", "6")[2]
+    assert "did you mean odd?" in command(capsys, "count", tmp_path, "--kind", "od")[2]
+    assert "arguments are required: DIR" in command(capsys, "count")[2]
+    with pytest.raises(ProblemError, match="this name has a meaning already"):
+        seqopt.register(seqopt.Command("scene", count))
+    own = seqopt.Command("say", lambda scene="arch25", *, engine="x": f"{scene} {engine}")
+    seqopt.register(own)  # what these words mean elsewhere is not meant
+    assert command(capsys, "say", "mine", "--engine", "own")[1] == "mine own\n"
+    seqopt.register(seqopt.Command("five", lambda: 5))
+    assert "it returns int; return a text or a table" in command(capsys, "five")[2]

@@ -46,17 +46,6 @@ def contents(folder):
     return out | {"summary.json": summary}
 
 
-@pytest.mark.slow
-def test_results_do_not_depend_on_workers_and_memory(tmp_path):
-    scene = tmp_path / "scene.json"
-    save_scene(small_arch(9), scene)
-    more = {"plain": [], "workers": ["--workers", "2"], "memory": ["--max-memory", "1 GB"]}
-    for name, words in more.items():
-        out = ["--out", str(tmp_path / name)]
-        assert main([*WORDS, "overlap_dp", str(scene), *out, *words]) == 0
-    assert all(contents(tmp_path / name) == contents(tmp_path / "plain") for name in more)
-
-
 @pytest.mark.parametrize(
     ("text", "size"), [("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("1k", 1000)]
 )

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import copy
+import json
 from dataclasses import replace
 
+import compas
 import numpy as np
 import pytest
+from compas.geometry import Box
+from hypothesis import given
+from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.scenes import running_bond
 from seqopt._registry import ADDED
-from seqopt.errors import ProblemError, SceneError, StepError
+from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError
 from seqopt.exchange import Content, FileBlock, Format, export_plan, import_scene
+from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
-from seqopt.exchange._formats import formats, readable, writable
+from seqopt.exchange._formats import DOCUMENTS as READERS
+from seqopt.exchange._formats import formats, readable, sniffed, writable
 from seqopt.problem import Amount
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES, vertices_of
 from seqopt.sequence.steps import Step, StepKind
+from tests.documents import DOCUMENTS as OTHERS
 
 GIVEN = Given(density=2000.0)
 
@@ -140,3 +149,57 @@ def test_every_format_that_goes_both_ways_says_what_it_loses():
     lose = {name for name, each in formats().items() if each.lost}
     assert lose == {*ENDS}
     assert {*readable()} & {*writable()} == lose | {"compas_assembly"}  # what was imported stays
+
+
+# documents with something in the wrong place: a scene, or one line; never anything else
+
+
+JUNK = (None, True, -1, 0, 3, 1e308, -1e-300, 10**400, "", "x", [], {}, [[1]], {"data": 1}, [0] * 3)
+
+
+def places(held, before=()):
+    """Where something stands in a document."""
+    if before:
+        yield before
+    rows = held.items() if isinstance(held, dict) else []
+    for key, value in enumerate(held) if isinstance(held, list) else rows:
+        yield from places(value, (*before, key))
+
+
+def by_compas():
+    """A document that COMPAS writes: a dictionary of shapes."""
+    return {"meshes of compas": json.loads(compas.json_dumps({"a": Box(1), "b": [Box(1)]}))}
+
+
+DOCUMENTS = OTHERS | by_compas()
+PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
+REMOVED = "removed"
+
+
+@st.composite
+def broken(draw):
+    """A document in which something is removed, or junk, or a copy of another part."""
+    name = draw(st.sampled_from(sorted(DOCUMENTS)))
+    document = copy.deepcopy(DOCUMENTS[name])
+    where = draw(st.sampled_from(PLACES[name]))
+    holder = document
+    for key in where[:-1]:
+        holder = holder[key]
+    what = draw(st.sampled_from((REMOVED, *JUNK)))
+    if what == REMOVED:
+        del holder[where[-1]]
+    else:
+        holder[where[-1]] = copy.deepcopy(what)
+    return document
+
+
+@given(document=broken())
+def test_a_scene_or_one_line(document):
+    said = ""
+    try:
+        form = sniffed(document, "file")
+        build_scene(READERS[form](document, "file"), Given(unit="m", density=2000.0), "file")
+    except SeqoptError as error:
+        said = str(error)
+    assert "\n" not in said
+    assert len(said) < 600

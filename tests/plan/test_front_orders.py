@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.placement.parts.staged import analyze_staged
+from seqopt.engines.registry import make_engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._orders import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
+from seqopt.network.build import build_network
 from seqopt.plan import front as fronts
 from seqopt.plan.front import find_front
 from seqopt.plan.pose import graph_of
-from seqopt.responses.table import analyze
+from seqopt.responses.table import analyze, force_column
+from seqopt.scene.scenarios import require_alike
+from seqopt.workflow import Robust
 from tests.builders import small_arch
+from tests.soft_bodies import SoftBodies
 
 AIMS = ["T_max,F_largest", pytest.param("D_max,steps", marks=pytest.mark.slow)]
 RULES = seqopt.FreeRules()
@@ -101,3 +107,89 @@ def test_what_does_not_fit_is_one_line(monkeypatch):
     monkeypatch.setattr("seqopt.graph.states.explored.MOST_PARTS", 3)
     with pytest.raises(TooManySetsError, match="more than 3 sets of bricks; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
+
+
+# plans of robots that give way: who holds which node counts, and how much each gives
+
+
+STIFF = (1e7, 1e5, 3e6)
+
+
+@pytest.fixture(scope="module")
+def unlike():
+    """A small arch with robots of three stiffnesses."""
+    scene = small_arch(5)
+    pairs = zip(scene.robots, STIFF, strict=True)
+    return scene.with_robots(*(replace(robot, stiffness=k) for robot, k in pairs))
+
+
+def by_robot(scene, step):
+    """The force of every robot in a step, zero of one that holds none, by a dense solver."""
+    who = [i for i, node in enumerate(step.grips) if node is not None]
+    hands = np.array([[STIFF[i]] * 3 + [0.0] * 3 for i in who]).reshape(-1, 6)
+    out = np.zeros(len(scene.robots))
+    if who:
+        nodes = [step.grips[i] for i in who]
+        borne, _ = SoftBodies(scene, step.bricks).solve(nodes, hands, np.zeros((len(who), 3)))
+        out[who] = np.linalg.norm(borne[:, :3], axis=1)
+    return out
+
+
+@pytest.mark.parametrize("schedule", ["three-robot", "free"])
+def test_plans_are_proven_and_their_forces_are_those_of_the_robots(unlike, schedule):
+    plan = seqopt.optimize(unlike, schedule, "worst-ratio")
+    assert plan.status == "optimal"
+    table = analyze(make_engine("compliance", unlike), plan.steps)
+    forces = table[[force_column(robot) for robot in unlike.robots]].fillna(0.0).to_numpy(float)
+    dense = np.array([by_robot(unlike, step) for step in plan.steps])
+    assert forces == pytest.approx(dense, rel=1e-9, abs=1e-7)
+    assert len({tuple(np.flatnonzero(row)) for row in dense}) > 2  # all robots take part
+
+
+def least(scene, **more):
+    """The least largest displacement of a free schedule, m, proven."""
+    plan = seqopt.optimize(scene, "free", aim="D_max", **more)
+    assert plan.status == "optimal"
+    (value,) = plan.objective.values()
+    return value
+
+
+def test_who_is_how_stiff_counts_and_not_who_comes_first(unlike):
+    """With all of one stiffness there are other values, between which these lie."""
+    own = least(unlike)
+    assert least(unlike.with_robots(*unlike.robots[::-1])) == pytest.approx(own, rel=1e-9)
+    softer, stiffer = (least(unlike.with_grips(k)) for k in (min(STIFF), max(STIFF)))
+    assert 1.01 * stiffer < own < 0.99 * softer
+
+
+@pytest.mark.slow
+def test_orders_are_searched_with_robots_that_differ(unlike):
+    assert least(unlike, order="search") <= least(unlike) * (1 + 1e-9)
+
+
+def test_scenarios_keep_who_is_like_whom(unlike):
+    require_alike(
+        unlike,
+        unlike.with_robots(
+            *(replace(r, stiffness=k) for r, k in zip(unlike.robots, (1e6, 2e6, 3e6), strict=True))
+        ),
+        1,
+    )
+    with pytest.raises(ProblemError, match="or other robots share a compliance"):
+        require_alike(unlike, unlike.with_grips(1e6), 1)
+    drawn = seqopt.scenarios(unlike, count=3, grips=(0.3, 3.0))
+    plan = seqopt.optimize(unlike, "free", "worst-ratio", robust=Robust(scenes=drawn.scenes))
+    assert plan.status == "optimal"
+
+
+def test_staged_builds_let_grips_give_way():
+    """Nearly rigid grips change nothing; soft ones do, and all that is held is in balance."""
+    scene = small_arch(5)
+    steps = seqopt.sequential(build_network(scene))
+    rigid, near = (analyze_staged(s, steps) for s in (scene, scene.with_grips(1e14)))
+    name = "D_max_1e-3mm"
+    assert near[name].to_numpy() == pytest.approx(rigid[name].to_numpy(), rel=1e-4)
+    soft = analyze_staged(scene.with_grips(1e5, 1e3), steps)
+    assert np.abs(soft[name] - rigid[name]).max() > 0.1 * rigid[name].max()
+    first = analyze(make_engine("compliance", scene.with_grips(1e5, 1e3)), steps[:1])
+    assert soft[name][0] == pytest.approx(first[name][0], rel=1e-9)

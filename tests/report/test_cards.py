@@ -13,7 +13,13 @@ from PIL import Image
 
 import seqopt
 from seqopt.problem.problem import Orders
-from seqopt.responses.table import force_column
+from seqopt.report.page import Build, report_page
+from seqopt.report.text import _deciding_step, _in_a_sentence
+from seqopt.responses.table import Departure, analyze, force_column
+from seqopt.sequence.methods import sequential
+from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability.assessment import Verdict
+from tests.browser import BROWSER, browsed, browses
 
 HEAVIEST = 60_000  # letters of HTML
 
@@ -57,3 +63,105 @@ def test_names_of_others_are_escaped(values):
     html = wild._repr_html_()
     assert "<script" not in html
     assert "&lt;script&gt;" in html
+
+
+# what a page opens with: the step that decides, one sentence, and a summary on one sheet
+
+
+STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
+browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+
+
+@pytest.fixture(scope="module")
+def steps(engine25):
+    return sequential(engine25.network)
+
+
+@pytest.fixture(scope="module")
+def table(engine25, steps):
+    """A build within all payloads: what exceeds one is half of it."""
+    found = analyze(engine25, steps)
+    found.loc[46, "F_rob2_N"] = 196.2
+    return found
+
+
+def dry(*wrong, verdict=FALLS):
+    """Return verdicts of a build of 49 steps, some of which do not stand."""
+    found = tuple(verdict if number in wrong else STANDS for number in range(1, 50))
+    first = wrong[0] if wrong and verdict is FALLS else 0
+    return BuildVerdicts("dry", found, first, "7" * bool(first), "6-7" * bool(first))
+
+
+def test_one_sentence_says_what_can_be_acted_on(engine25, table):
+    scene = engine25.network.scene
+    said = _in_a_sentence(scene, table, [dry()])
+    assert said == (
+        "2 robots build arch25 in 49 steps; all within payload, 95 % at most (robot 1 in step 26); "
+        "every step stands, dry."
+    )
+    assert "; whether its steps stand was not asked." in _in_a_sentence(scene, table)
+    unknown = _in_a_sentence(scene, table, [dry(3, 4, verdict=OPEN)])
+    assert "of 2 steps it is not known whether they stand dry" in unknown
+    assert "every step" not in unknown
+
+
+def test_what_cannot_be_built_is_said_first(engine25, table):
+    scene, over = engine25.network.scene, table.copy()
+    over.loc[46, "F_rob2_N"] = 500.0
+    said = _in_a_sentence(scene, over, [dry(9, 12)])
+    assert said == (
+        "Not buildable: payload exceeded in 1 of 49 steps, first in step 47 (robot 2 would hold up "
+        "to 500 N and can hold 392.4 N); dry, 2 of 49 steps fall, the first is step 9 (brick 7, "
+        "joint 6-7)."
+    )
+    known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
+    said = _in_a_sentence(scene, table, known)
+    assert said.startswith("2 robots build arch25 in 49 steps; ")  # with the mortar of the scene
+    assert "; dry, step 9 falls (brick 7, joint 6-7); every step stands with epoxy." in said
+    arms = _in_a_sentence(scene, table, known, faults=["rob1 reaches no posture (step 3)"])
+    assert arms.startswith("Not buildable: rob1 reaches no posture (step 3); ")
+    left = _in_a_sentence(scene, table, known, [Departure("rotation", "1 rad, too much", (3,))])
+    assert left.startswith("Outside the linear range: rotation of up to 1 rad, too much (step 3).")
+
+
+def test_the_step_that_decides_is_never_one_that_nobody_holds(engine25, table):
+    scene = engine25.network.scene
+    shares = [table[f"F_rob{k}_N"].abs().max() for k in (1, 2)]
+    assert _deciding_step(scene, table, ()) == 25
+    assert table.loc[25, "F_rob1_N"] == max(shares)
+    assert _deciding_step(scene, table, [dry(9)]) == 8
+    assert _deciding_step(scene, table, [dry(9), dry()]) == 25  # it stands with the last mortar
+    over = table.copy()
+    over.loc[[3, 30], "F_rob1_N"] = 500.0
+    assert _deciding_step(scene, over, [dry(9)]) == 3
+
+
+@pytest.fixture
+def page(engine25, steps, table, tmp_path):
+    known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
+    pressed = table.assign(F_max_N=table["F_max_N"].where(table["step"] < 49, -50.0))
+    build = Build("sequential", steps, pressed, known)  # in its last step all edges are pressed
+    path = tmp_path / "report.html"
+    path.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
+    if not browses():
+        pytest.skip("Chromium does not run here")
+    return path
+
+
+@pytest.mark.slow
+@browser
+def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp_path):
+    text, _ = browsed(tmp_path, f"file://{page}")
+    assert "sequential, step 26 of 49" in text
+    assert 'src="data:image/png' in text  # what is printed
+    assert "dry: 1 of 49 falls" in text
+    assert "with epoxy: every step stands" in text
+    rows = re.findall(r'<tr data-step="(\d+)".*?</tr>', text, re.S)
+    assert rows == [str(number) for number in range(1, 50)]
+    (ninth,) = re.findall(r'<tr data-step="9".*?</tr>', text, re.S)
+    assert ninth.index(">falls<") < ninth.index(">stands<")
+    assert "<td>robot 3</td>" in re.sub(r"<span[^>]*></span>", "", text)
+    lines = re.findall(r'<polyline points="([^"]*)"', text)
+    heights = [float(point.split(",")[1]) for line in lines for point in line.split()]
+    assert len(lines) == 4
+    assert max(heights) == 172  # on the axis, not below it
