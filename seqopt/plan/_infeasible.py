@@ -227,11 +227,17 @@ def _why_impossible(problem: States, look: Look) -> str:
             what = "the finished structure, which nobody holds," if finished else what
             where = f"{what} {_fault(problem, *state)}"
         else:
-            found = look(steps)
-            if found.whole and any(goal.of_criterion for goal in problem.aims):
+            explored = look(steps)
+            if explored.whole and any(goal.of_criterion for goal in problem.aims):
                 return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
-            where = _where(problem, found.reached)
-        return f"{problem.title}: {where}{_remedies(problem, look, finished=finished)}"
+            where = _where(problem, explored.reached)
+        ways = _ways(problem, look, finished=finished)
+        helps = ", whichever rule or limit is loosened; extend a reach or add a robot"
+        if found := [_enough(problem, look, *way) for way in ways]:
+            helps = f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
+        elif finished:  # nobody holds it
+            helps = "; no robot helps: it needs more bond or friction, less load, or other limits"
+        return f"{problem.title}: {where}{helps}"
     except LateError:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
@@ -289,19 +295,6 @@ def _unbearable(problem: States) -> dict[int, str]:
 
 
 Way = tuple[str, str, States]  # the filter that is loosened, how in words, and the problem then
-
-
-def _remedies(problem: States, look: Look, *, finished: bool) -> str:
-    """Describe the relaxations that are enough, each alone, as the end of a line.
-
-    ``finished``: whether the finished structure fails, which nobody holds: no robot helps.
-    """
-    ways = _ways(problem, look, finished=finished)
-    if found := [_enough(problem, look, *way) for way in ways]:
-        return f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
-    if finished:
-        return "; no robot helps: it needs more bond or friction, less load, or other limits"
-    return ", whichever rule or limit is loosened; extend a reach or add a robot"
 
 
 def _ways(problem: States, look: Look, *, finished: bool) -> Iterator[Way]:

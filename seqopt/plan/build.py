@@ -17,7 +17,7 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
-from seqopt.responses._tolerance import tolerance_table
+from seqopt.responses._tolerance import COLUMN, step_tolerance
 from seqopt.responses.quantities import _props_table
 from seqopt.responses.table import (
     Departure,
@@ -120,7 +120,15 @@ class ShownBuild(Shown):
         which no robot exceeds its payload, and what ``stops`` grips from being farther off. Raises
         `ProblemError` for discrete elements, which are not linear in that.
         """
-        return tolerance_table(self.engine, self.steps)
+        found = [step_tolerance(self.engine, step) for step in self.steps]
+        return pd.DataFrame(
+            {
+                "step": [step.number for step in self.steps],
+                COLUMN: [1e3 * each.distance for each in found],
+                "proven_mm": [1e3 * each.proven for each in found],
+                "stops": [each.what for each in found],
+            }
+        )
 
     def times(self) -> pd.DataFrame:
         """Return the earliest start and end times of all actions, in the order of the steps.

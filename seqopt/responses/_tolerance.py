@@ -27,7 +27,6 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns
@@ -197,19 +196,6 @@ def each_tolerance(
 def tolerances_along(engine: Engine, steps: Sequence[Step]) -> list[float]:
     """Return the tolerances of steps, mm."""
     return [1e3 * step_tolerance(engine, step).distance for step in steps]
-
-
-def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
-    """Return a row per step with the tolerance of its grips, mm, and the limit reached first."""
-    found = [step_tolerance(engine, step) for step in steps]
-    return pd.DataFrame(
-        {
-            "step": [step.number for step in steps],
-            COLUMN: [1e3 * each.distance for each in found],
-            "proven_mm": [1e3 * each.proven for each in found],
-            "stops": [each.what for each in found],
-        }
-    )
 
 
 def misfits_along(table: _Columns) -> Floats:
