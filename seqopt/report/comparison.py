@@ -66,27 +66,23 @@ class Comparison(Terse):
         not compete), ``objective`` and ``gap`` to the exact optimum of its aim; the largest
         ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, whether a
         robot is ``overloaded`` and results are ``outside`` the linear range, how many ``models`` it
-        looks at, and the ``seconds`` that it took alone, ``solve_seconds`` of them to choose.
-    tables : mapping of str to pandas.DataFrame
-        Responses of every step, by row of ``table``.
+        looks at, the ``seconds`` that it took alone, ``solve_seconds`` of them to choose, and how
+        many steps fall, as ``falls_dry``.
+    tables, departures, verdicts : mapping of str
+        By row of ``table``: the responses of every step; the limits of the linear range that are
+        left; which steps stand, with each mortar that was asked for.
     notes : tuple of str
         Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
         the paper's own numbers.
     refusal : str
         Why the scene has no loop of its robots; empty if it has.
-    departures : mapping of str to tuple of Departure
-        The limits of the linear range that builds leave, by row of ``table``.
     criteria : mapping of str to Criterion
         With all of their numbers, by the problem whose rows they are the objective of.
-    verdicts : mapping of str to tuple of BuildVerdicts
-        Which steps stand, by row of ``table``, one for each mortar that was asked for; of these the
-        table counts the steps that fall, as ``falls_dry``.
     enough : Enough
         Which model was enough for all steps, and what more detailed ones would change.
     speed : RegretTable or None
-        How long every way to a plan takes, and what its plan costs in the most detailed model, if
-        that was asked for: ``speed.sentence`` says which to take, ``speed.table`` has the numbers,
-        ``speed.plot()`` draws them.
+        How long every way to a plan takes, and what its plan costs in the most detailed model: its
+        ``sentence`` says which to take, ``plot()`` draws its ``table``. None if it was not asked.
     """
 
     maxima: pd.DataFrame

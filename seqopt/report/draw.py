@@ -267,7 +267,7 @@ def _draw_robots(
     """Draw the ground and the arms of all robots, behind the structure or before it.
 
     ``arms``: of every robot in a step: its bodies are drawn where its posture is known, otherwise
-    the line from its foot to its grip; see `seqopt.report._robots`.
+    the line from its foot to its grip; see `seqopt.report._robots`. Tools are dark.
     """
     right, up, toward = view.axes()
     seen = np.stack([right, up]).T
@@ -278,8 +278,14 @@ def _draw_robots(
         points = arm.line if isinstance(arm, PosedArm) else arm
         color = grip_mark(i)["color"]
         order = 4.0 if (points[0] - cell.middle) @ toward > 0 else 0.5
-        if isinstance(arm, PosedArm):
-            _draw_bodies(axes, arm, view, color=color, order=order)
+        bodies = [body @ view.axes().T for body in arm.bodies] if isinstance(arm, PosedArm) else []
+        for body in sorted(bodies, key=lambda body: float(body[:, 2].mean())):  # farthest first
+            tool = isinstance(arm, PosedArm) and arm.holds and body is bodies[-1]
+            face = to_rgb(INK) if tool else tuple(1 - PALE * (1 - np.array(to_rgb(color))))
+            fill: Any = {"fc": (*face, THROUGH if order > 1 else 1.0), "ec": color, "lw": 0.7}
+            around = body[spatial.ConvexHull(body[:, :2]).vertices, :2]
+            axes.add_patch(Polygon(around, joinstyle="round", zorder=order, **fill))
+        if bodies:
             continue
         line, wide = points @ seen, ARM if len(points) > 2 else 0.5 * ARM
         look: Any = {"fill": False, "capstyle": "round", "zorder": order}
@@ -287,17 +293,6 @@ def _draw_robots(
             links = PathPatch(Path(line[:-1]), lw=width, ec=paint, joinstyle="round", **look)
             axes.add_patch(links)
         axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **look))  # its tool
-
-
-def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: float) -> None:
-    """Draw an arm as the outlines of its bodies, the farthest first, its tool dark."""
-    seen = [points @ view.axes().T for points in arm.bodies]
-    last = len(seen) - 1 if arm.holds else None
-    for k in sorted(range(len(seen)), key=lambda k: float(seen[k][:, 2].mean())):
-        around = seen[k][spatial.ConvexHull(seen[k][:, :2]).vertices, :2]
-        face = to_rgb(INK) if k == last else tuple(1 - PALE * (1 - np.array(to_rgb(color))))
-        fill = (*face, THROUGH if order > 1 else 1.0)
-        axes.add_patch(Polygon(around, fc=fill, ec=color, lw=0.7, joinstyle="round", zorder=order))
 
 
 def _draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View) -> None:

@@ -338,15 +338,14 @@ def _part(caption: str, part: pd.DataFrame | bytes) -> str:
 
 def _cell_text(value: object) -> object:
     """Return a number with four digits, or a count with separators, without powers of ten."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
-        return "" if value is None or value is pd.NA else value
-    if np.isnan(value):
+    if value is None or value is pd.NA or value != value:  # noqa: PLR0124  # of NaN
         return ""
-    if isinstance(value, int | np.integer):
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
         return f"{value:,}"
+    if not isinstance(value, float | np.floating):
+        return value
     number = float(value)
     if 1e3 <= abs(number) < 1e12:
         return f"{number:,.0f}"
     text = _number_text(number)
-    small = "e" in text and np.isfinite(number)
-    return np.format_float_positional(float(text), trim="-") if small else text
+    return np.format_float_positional(float(text), trim="-") if "e" in text else text
