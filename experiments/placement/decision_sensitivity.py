@@ -32,8 +32,8 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.ranks import rank_of
 from experiments.harness.results import drawn
-from experiments.study.parts.ranks import rank_of
 from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph._decision_search import Windows

@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.ranks import rank_choice
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
-from experiments.study.parts.ranks import rank_choice
 from seqopt import three_robot_loop
 from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.problem.criteria import RankSum, equal

@@ -10,21 +10,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.errors import InfeasibleError
+from seqopt import judge_instance
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.decision_costs import Budget, LayeredCosts
+from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.judge._rule_moves import RuleTables
+from seqopt.judge.certificate import TOLERANCE
+from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.problem import Aim
 from seqopt.sequence.steps import StepKind
 from tests.builders import first
+from tests.layered import Costs, answer, changed, path_of, told
 from tests.plain_rules import PlainBook
-from tests.strategies import free_builds
+from tests.strategies import free_builds, problems
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 few = settings(max_examples=3, deadline=None)
 
 
-def told(book, tables, bricks, state):
+def follows(book, tables, bricks, state):
     """What follows from a row by the book, as plain values."""
     robots = len(book.network.scene.robots)
     grips = [None] * robots
@@ -49,7 +56,7 @@ def test_tables_say_what_the_book_says(build, data):
     work = [*reached]
     while work:
         bricks, row = work.pop()
-        expected = {*told(book, tables, bricks, row)}
+        expected = {*follows(book, tables, bricks, row)}
         states = np.array([row], dtype=np.int32)
         found = {
             (follows.level, tuple(after), follows.regrip)
@@ -63,7 +70,7 @@ def test_tables_say_what_the_book_says(build, data):
         )
         work += found - reached
         reached |= found
-    assert len(reached) > 1 or not {*told(book, tables, *reached.pop())}
+    assert len(reached) > 1 or not {*follows(book, tables, *reached.pop())}
 
 
 @pytest.mark.parametrize("aim", ["minmax,steps", "sum(D_max),regrips", "travel"])
@@ -98,3 +105,131 @@ def test_the_models_of_a_proof_are_those_that_engines_solved(count):
     proof = Proof(problem)
     proof.bounds((value,))
     assert proof.models == sum(engine.tally.total() for engine in engines) - before > 0
+
+
+# what a formulation claims is recomputed: false answers, broken promises, bounds
+
+
+HEURISTIC, EXACT = FormulationKind.HEURISTIC, FormulationKind.EXACT
+
+
+def bounded(bound):
+    return lambda s: replace(s, bound=(bound(s.objective[0]),))
+
+
+def test_promises_are_held(problem25):
+    """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
+    cascade = find_formulation("cascade")
+    with pytest.raises(SolverError, match="cascade promises the least, and no more than 657"):
+        solve(problem25, replace(cascade, kind=EXACT))
+    poor = bounded(lambda value: value)
+    with pytest.raises(SolverError, match=r"claimed bound 663\.\d+ exceeds 657\.\d+"):
+        solve(problem25, changed(cascade, poor))
+    with pytest.raises(SolverError, match="claimed bound"):
+        solve(problem25, changed(cascade, bounded(lambda value: 0.995 * value)))
+
+
+def proven(costs, aim):
+    """What the judge proves of any choice, given one."""
+    choice = next(iter(costs.within(aim)))
+    compiled = costs.compiled(aim)
+    return judge_instance(compiled.instance, path_of(compiled, choice)).bound + compiled.offset
+
+
+@given(problem=problems())
+def test_the_least_of_any_choice_is_that_of_enumeration(problem):
+    for aim in Aim:
+        if problem.within(aim):
+            assert proven(problem, aim) == problem.best(aim)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_least_is_found_among_costs_of_any_size_and_sign(seed):
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(1, 5, size=4)
+    single = tuple(rng.normal(size=size) for size in sizes)
+    shared = tuple(rng.normal(size=pair) for pair in zip((1, *sizes[:-1]), sizes, strict=True))
+    costs = Costs(LayeredCosts(single, shared))
+    for aim in Aim:
+        assert proven(costs, aim) == pytest.approx(costs.best(aim), rel=1e-12, abs=1e-12)
+
+
+def signed(*bounds):
+    """Four choices: (0, 0) is worth 2, (0, 1) -2, (1, 0) 7 and (1, 1) 3. All take 1."""
+    single, none = (np.array([-3.0, 2.0]), np.array([5.0, 1.0])), (np.zeros((1, 2)), np.eye(2) * 0)
+    amounts = (np.ones(2), np.zeros(2))
+    budgets = tuple(Budget(f"use {bound:g}", amounts, none, bound) for bound in bounds)
+    return Costs(LayeredCosts(single, none), budgets)
+
+
+BEST = (0, 1)  # of the sum and of the peak
+VALUES = {Aim.SUM: -2.0, Aim.PEAK: 1.0}
+POOR = {Aim.SUM: ((1, 1), 3.0, 6.0), Aim.PEAK: ((1, 1), 2.0, 2.0)}  # value, and above the least
+within = pytest.mark.parametrize("aim", Aim)
+
+
+@within
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_how_far_a_claim_may_be_off(aim, sign):
+    """By the tolerance, over the value, above what every path takes at least on its arcs."""
+    choice, value, size = POOR[aim]
+    for share, good in ((0.99, True), (1.01, False)):
+        claimed = told(signed(), choice, value + sign * share * TOLERANCE * size, aim=aim)
+        if good:
+            assert answer(signed(), claimed).certificate.objective == pytest.approx(value)
+        else:
+            with pytest.raises(SolverError, match="as claimed"):
+                answer(signed(), claimed)
+
+
+@within
+def test_how_high_a_claimed_bound_may_be(aim):
+    choice, value, size = POOR[aim]
+    least = VALUES[aim]
+    near = least + 0.99 * TOLERANCE * size
+    proof = answer(signed(), told(signed(), choice, value, near, aim=aim)).certificate
+    assert proof.bound == pytest.approx(least)
+    assert proof.claimed_gap == pytest.approx(proof.gap, rel=1e-5)
+    for bound in (least + 1.01 * TOLERANCE * size, value, np.inf, np.nan):
+        with pytest.raises(SolverError, match=r"claimed bound .* exceeds|a bound is above"):
+            answer(signed(), told(signed(), choice, value, bound, aim=aim))
+
+
+def test_with_budgets_a_bound_may_lie_above_the_least_but_not_above_the_value():
+    claimed = (1, 1), 3.0, 2.5
+    with pytest.raises(SolverError, match="claimed bound"):
+        answer(signed(), told(signed(), *claimed))
+    costs = signed(1.0, 2.0)
+    proof = answer(costs, told(costs, *claimed)).certificate
+    assert (proof.gap, proof.claimed_gap) == pytest.approx((5 / 6, 0.5 / 6))
+    assert proof.spent == {"use 1": 1.0, "use 2": 1.0}
+    with pytest.raises(SolverError, match="a bound is above its value"):
+        answer(costs, told(costs, (1, 1), 3.0, 3.1))
+
+
+def test_how_far_a_budget_may_be_exceeded():
+    costs = signed(9.0, 1 - 0.99 * TOLERANCE)
+    answer(costs, told(costs, BEST, -2.0))
+    costs = signed(9.0, 1 - 2 * TOLERANCE)
+    with pytest.raises(SolverError, match=r"use 0\.9\S* is 1, more than the 0\.9\S* allowed; use"):
+        answer(costs, told(costs, BEST, -2.0))
+
+
+@pytest.mark.parametrize("kind", FormulationKind)
+@pytest.mark.parametrize("bounds", [(), (1.0,)])
+@pytest.mark.parametrize(("excess", "kept"), [(0.99 * TOLERANCE, True), (1.01 * TOLERANCE, False)])
+def test_who_promises_the_optimum_reaches_it(kind, bounds, excess, kept):
+    """Budgets aside, whoever is no heuristic does, unless its search was stopped."""
+    none = (np.array([[1.0, 1.0]]),)
+    costs = LayeredCosts((np.array([0.0, excess / (1 - excess)]),), none)
+    budgets = tuple(Budget("use", (np.zeros(2),), (np.zeros((1, 2)),), b) for b in bounds)
+    costs = Costs(costs, budgets)
+    given_up = (1,), costs.sums.cost((1,))
+    early = answer(costs, told(costs, *given_up, kind=kind, stopped="time")).certificate
+    assert early.gap == pytest.approx(excess, rel=1e-6)
+    claimed = told(costs, *given_up, kind=kind)
+    if kept or bounds or kind is HEURISTIC:
+        assert answer(costs, claimed).certificate.gap == pytest.approx(excess, rel=1e-6)
+    else:
+        with pytest.raises(SolverError, match="told promises the least, and no more than 1 is pro"):
+            answer(costs, claimed)

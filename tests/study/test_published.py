@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.study.parts.ranks import rank_choice
+from experiments.harness.ranks import rank_choice
 from seqopt.plan.solve import solve
 from seqopt.study.published import published_choice, published_plan
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from experiments.harness.ranks import rank_choice
 from experiments.harness.yardstick import errors, percentiles, tension_share
-from experiments.study.parts.ranks import rank_choice
 from seqopt.graph.decisions import pose_decisions
 from seqopt.report.comparison import compare
 from seqopt.responses.table import analyze

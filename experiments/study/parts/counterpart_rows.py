@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, vaults
+from experiments.harness.ranks import rank_choice
 from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
-from experiments.study.parts.ranks import rank_choice
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
