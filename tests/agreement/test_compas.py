@@ -23,7 +23,7 @@ from seqopt.stability.assessment import Verdict, assess
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:scene .* rest on the ground"),  # shelves do
-    pytest.mark.filterwarnings("ignore:scene .* interpenetrate"),  # stones of the armadillo do
+    pytest.mark.filterwarnings("ignore:scene .* interpenetrate"),  # stones of samples do
     pytest.mark.xdist_group("samples of compas_cra"),  # which one worker reads
 ]
 compas = pytest.importorskip("compas")
