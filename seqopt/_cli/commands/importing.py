@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -57,15 +58,16 @@ def run(
     require_apart([out], [file])
     progress("reading the file")
     more: dict[str, Any] = {"progress": progress}
-    if supports is not None:
-        more["supports"] = [key.strip() for key in supports.split(",") if key.strip()]
     if stiffness is not None:
         pair, where = stiffness.split(","), f"--stiffness {stiffness}"
         if len(pair) != 2:
             raise ProblemError(f"{where}: give two numbers, as 1.5e9,1.5e8")
         along, across = (number_word(number, where) for number in pair)
         more["law"] = JointLaw(translational=(along, across, across))
-    scene = import_scene(file, format, given(**more))
+    asked = given(**more)
+    if supports is not None:  # also if none are supports
+        asked = replace(asked, supports=[key.strip() for key in supports.split(",") if key.strip()])
+    scene = import_scene(file, format, asked)
     write_text(out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
     said = "\n".join([*assumed, f"{remarks.size_line(scene)}; written to {out}"])
