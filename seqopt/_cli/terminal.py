@@ -126,12 +126,15 @@ def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
     with warnings.catch_warnings(), NUMPY.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)
         for kind in (SceneWarning, PluginWarning):
-            warnings.simplefilter("ignore" if quiet else "module", kind)
+            warnings.simplefilter("ignore" if quiet else "always", kind)
         otherwise = warnings.showwarning
+        said: set[str] = set()  # pandas makes Python forget what it has warned of
 
         def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
             if issubclass(category, SceneWarning | PluginWarning):
-                complain(f"seqopt: warning: {message}")
+                if str(message) not in said:
+                    complain(f"seqopt: warning: {message}")
+                said.add(str(message))
             else:
                 otherwise(message, category, *rest)
 
