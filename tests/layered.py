@@ -30,7 +30,7 @@ class Costs:
         return compile_costs("drawn", aim.costs(self), aim, self.budgets, self.alone or self.sums)
 
     def worth(self, choice, aim=Aim.SUM):
-        return aim.value_of(aim.costs(self), choice)
+        return (self.sums.cost if aim is Aim.SUM else self.peaks.worst)(choice)
 
     def within(self, aim=Aim.SUM):
         """What every choice within limits and budgets is worth."""

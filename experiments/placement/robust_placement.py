@@ -126,7 +126,7 @@ def over_draws(problem: Decisions, count: int, seed: int) -> States:
 def values(graph: States, aim: Aim, choice: Choice) -> Floats:
     """Return the value of a choice in every scenario, infinite where it exceeds a limit."""
     found = map(aim.costs, graph.costs_in_scenarios)
-    return np.array([aim.value_of(costs, choice) for costs in found])
+    return np.array([(costs.cost if aim is Aim.SUM else costs.worst)(choice) for costs in found])
 
 
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
@@ -164,7 +164,10 @@ def measured(plan: Plan, unseen: States) -> dict[str, object]:
         choices = {"robust": [plan.choice] * len(found), "nominal": [nominal] * len(found)}
         for who, each in (choices | {"knows_it": [*map(best, found)]}).items():
             pairs = zip(found, each, strict=True)
-            reached = [aim.value_of(aim.costs(costs), choice) for costs, choice in pairs]
+            reached = [
+                (costs.sums.cost if aim is Aim.SUM else costs.peaks.worst)(choice)
+                for costs, choice in pairs
+            ]
             row[f"{name}_{who}"] = graph.over.value(np.array(reached))
     return {**row}
 

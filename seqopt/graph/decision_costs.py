@@ -32,7 +32,7 @@ class LayeredCosts(FrozenValue):
     ``single`` (tuple of (C_k,) float): of each candidate in the steps in which its move alone is
     open; infinite where it is not allowed; ``shared`` (tuple of (C_{k-1}, C_k) float): of each pair
     in the steps that the move shares with the one before; of the first move (1, C_0). Raises
-    `ProblemError` if a move has no candidates, or values are so large that their sum overflows.
+    `ProblemError` if a move has no candidates, a value is no cost, or their sum overflows.
     """
 
     single: tuple[Floats, ...]
@@ -46,6 +46,8 @@ class LayeredCosts(FrozenValue):
             move = self.sizes.index(0) + 1
             raise ProblemError(f"move {move} has no candidates; widen a reach or free a node")
         some = [*map(_values, (*self.single, *self.shared))]  # the largest that is allowed counts
+        if any((np.isnan(values) | (values == -np.inf)).any() for values in some):
+            raise ProblemError("a cost is NaN or -inf; mark what is not allowed as inf")
         if sum(float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for v in some) == np.inf:
             raise ProblemError("the costs are so large that their sum overflows; rescale them")
         super().__post_init__()

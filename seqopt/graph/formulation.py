@@ -6,7 +6,7 @@ import inspect
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
@@ -162,12 +162,6 @@ class Watch:
             self._trace.append(found)
             if self._progress is not None:
                 self._progress(found)
-
-
-def trace_rows(trace: Sequence[Finding]) -> list[dict[str, float]]:
-    """Return a trace as rows of ``seconds``, ``objective``, ``bound`` and ``gap``."""
-    names = ("seconds", "objective", "bound", "gap")
-    return [{name: getattr(found, name) for name in names} for found in trace]
 
 
 LEAST = {Aim.SUM: "sum", Aim.PEAK: "largest"}

@@ -34,7 +34,7 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.pose import AIMS, chooses_moves, graph_of
 from seqopt.problem.amounts import Amount
 from seqopt.problem.problem import Aim, Problem
-from seqopt.problem.requirements import LIMIT_TOLERANCE
+from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
 from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
@@ -275,7 +275,8 @@ def best_within(
     if found.stopped == INTERRUPT:
         return replace(found, beyond=INTERRUPTED)
     try:
-        return measured(problem.within_range(1.0))
+        limit = Limit(LINEAR_RANGE, 1.0)
+        return measured(replace(problem, limits=(*problem.limits, limit)))
     except InfeasibleError:
         return replace(found, beyond=NONE_KEEPS)
     except SeqoptError as error:

@@ -55,10 +55,6 @@ class Aim(Enum):
         """How costs go together."""
         return np.add if self is Aim.SUM else np.maximum
 
-    def value_of(self, costs: Any, choice: Sequence[int]) -> float:
-        """Return the value of a choice by costs of candidates: its total, or its largest cost."""
-        return float(costs.cost(choice) if self is Aim.SUM else costs.worst(choice))
-
     def costs(self, decisions: Any) -> Any:
         """Return the costs of candidates that this aim is about: sums or peaks."""
         return decisions.sums if self is Aim.SUM else decisions.peaks
@@ -384,10 +380,6 @@ class Problem(Shown):
         return self.says_range and all(
             math.isinf(limit.bound) for limit in self.limits if limit.response == LINEAR_RANGE
         )
-
-    def within_range(self, share: float) -> Problem:
-        """Return the problem with a limit on the linear range, a share of it."""
-        return replace(self, limits=(*self.limits, Limit(LINEAR_RANGE, share)))
 
     @cached_property
     def graphs(self) -> dict[str, Any]:

@@ -79,7 +79,7 @@ def values(layers, aim):
     """What every choice that is allowed in all scenarios is worth."""
     found = {}
     for choice in product(*(range(size) for size in layers[0].sizes)):
-        each = [aim.aim.value_of(costs, choice) for costs in layers]
+        each = [(costs.cost if aim.aim is Aim.SUM else costs.worst)(choice) for costs in layers]
         if np.isfinite(each).all():
             found[choice] = tail(each, aim)
     return found

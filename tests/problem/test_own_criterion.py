@@ -128,7 +128,9 @@ def values(goals):
     """What every allowed choice is worth, in the order of the aims."""
     found = {}
     for choice in product(*(range(size) for size in goals[0][0].sizes)):
-        worth = tuple(aim.value_of(costs, choice) for costs, aim in goals)
+        worth = tuple(
+            (costs.cost if aim is Aim.SUM else costs.worst)(choice) for costs, aim in goals
+        )
         if np.isfinite(worth).all():
             found[choice] = worth
     return found

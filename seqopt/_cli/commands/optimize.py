@@ -20,7 +20,7 @@ from seqopt._cli.words import Folder
 from seqopt._files import csv_text
 from seqopt._later import Later
 from seqopt._showing import PAGE
-from seqopt.graph.formulation import End, trace_rows
+from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
@@ -145,7 +145,9 @@ def _files(
     tables: Mapping[str, bytes | str],
 ) -> dict[str, bytes | str]:
     """Return the files of a plan by name."""
-    page, trace = PAGES.plan_page(plan, prover), pd.DataFrame(trace_rows(plan.trace))
+    names = ("seconds", "objective", "bound", "gap")
+    page = PAGES.plan_page(plan, prover)
+    trace = pd.DataFrame([[getattr(each, n) for n in names] for each in plan.trace], columns=names)
     finite = json.loads(json.dumps(report()), parse_constant=lambda _: None)
     return {
         "summary.json": json.dumps(finite, indent=2) + "\n",

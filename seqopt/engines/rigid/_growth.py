@@ -139,17 +139,13 @@ class Growth:
                 closing, changes = self._close(others)
             self._before = _Before(weighed, loss, closing, changes)
 
-    def recalls(self, bricks: int) -> bool:
-        """Return whether `answers` of a brick count are there, or nearly so."""
-        last = self.remembers and self._before is not None
-        return self.bricks - last <= bricks <= self.bricks
-
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
         """Return motions of bricks under the weight, and under unit wrenches on some bricks (h,).
 
         Results: twists and wrenches, 1 + kh rows; the loss (h,).
         """
-        if not self.recalls(bricks):
+        last = self.remembers and self._before is not None
+        if not self.bricks - last <= bricks <= self.bricks:
             self.reach(bricks)
         rows: slice | Ints = slice(1 + 6 * bricks)
         if len(held) < bricks:
