@@ -52,7 +52,8 @@ def difference(network: Network, bricks: int, sets: Ints) -> float:
     true = plain._extremes(bricks, sets, WANT)
     found = ComplianceEngine(network)._extremes(bricks, sets, WANT, compiled=True)
     operator, pull = plain._kept[bricks], true.force.max()
-    unit = [np.abs(operator.mean(n)[:-1]).max() for n in ("edge_force", "displacement", "support")]
+    names = "edge_force", "displacement", "support"
+    unit = [np.abs(operator.of_loads(name)[:-1]).max() for name in names]
     scales = [unit[0], unit[0], unit[1], unit[2], 1.0]
     gaps = zip(true, found, scales, strict=True)
     return float(max(np.abs(a - b).max() / (pull * each) for a, b, each in gaps))

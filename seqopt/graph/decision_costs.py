@@ -40,8 +40,7 @@ class LayeredCosts(FrozenValue):
 
     def __post_init__(self) -> None:
         for name in ("single", "shared"):
-            copied = tuple(_copied(costs) for costs in getattr(self, name))
-            object.__setattr__(self, name, copied)
+            object.__setattr__(self, name, tuple(map(_copied, getattr(self, name))))
         if 0 in self.sizes:
             move = self.sizes.index(0) + 1
             raise ProblemError(f"move {move} has no candidates; widen a reach or free a node")

@@ -36,7 +36,6 @@ from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, AskedBudget, RobustAim
 from seqopt.problem.requirements import (
     Criterion,
-    Excess,
     Limit,
     ResponsesAsked,
     SceneFacts,
@@ -239,7 +238,13 @@ class Decisions(Shown):
         ``worlds``: scenes of scenarios, in which bricks are carried too. Raises `InfeasibleError`,
         naming the limit, the value and the steps.
         """
-        _require_carried(self.schedule, [self.engine.network.scene, *worlds])
+        schedule, scenes = self.schedule, [self.engine.network.scene, *worlds]
+        heavy = [each for scene in scenes for each in _carrying_excesses(scene, schedule.steps)]
+        worst = {each.robot: each for each in sorted(heavy, key=lambda each: each.largest)}
+        if worst:
+            enough = (f"--payload {n}={_payload_text(each.largest)}" for n, each in worst.items())
+            said = f"{'; '.join(map(str, worst.values()))}; it takes {' '.join(enough)}"
+            raise InfeasibleError(f"{schedule.method} schedule: {said}")
         if worlds or not (self.limits and self.given):  # looked at when their costs are computed
             return
         table = self.evaluation.table_of_given(limit.response for limit in self.limits)
@@ -313,18 +318,6 @@ class Decisions(Shown):
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of a choice; a `StepError` says which one is impossible."""
         return self.schedule.fill(self.nodes(choice))
-
-
-def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:
-    """Raise an `InfeasibleError` if a robot has to carry a brick in a scene that is too heavy."""
-    found = [each for scene in scenes for each in _carrying_excesses(scene, schedule.steps)]
-    if found:
-        worst: dict[str, Excess] = {}
-        for each in sorted(found, key=lambda each: each.largest):
-            worst[each.robot] = each
-        enough = (f"--payload {n}={_payload_text(each.largest)}" for n, each in worst.items())
-        said = "; ".join(map(str, worst.values()))
-        raise InfeasibleError(f"{schedule.method} schedule: {said}; it takes {' '.join(enough)}")
 
 
 def pose_decisions(

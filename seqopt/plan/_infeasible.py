@@ -11,7 +11,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain, combinations
+from itertools import chain, combinations, islice
 
 import numpy as np
 
@@ -231,9 +231,12 @@ def _why_impossible(problem: States, look: Look) -> str:
             if explored.whole and any(goal.of_criterion for goal in problem.aims):
                 return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
             where = _where(problem, explored.reached)
-        ways = _ways(problem, look, finished=finished)
-        helps = ", whichever rule or limit is loosened; extend a reach or add a robot"
-        if found := [_enough(problem, look, *way) for way in ways]:
+        ways = [*_ways(problem, look, finished=finished)]
+        found = [_enough(problem, look, *way) for way in ways]
+        if not finished and all(name == "arms" for name, *_ in ways):
+            found += [*islice(_pairs(problem, look, arms=not ways), 1)]
+        helps = ", even if two rules or limits are loosened; extend a reach or add a robot"
+        if found:
             helps = f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
         elif finished:  # nobody holds it
             helps = "; no robot helps: it needs more bond or friction, less load, or other limits"
@@ -311,6 +314,16 @@ def _ways(problem: States, look: Look, *, finished: bool) -> Iterator[Way]:
             if key not in done and look.exists(relaxed):
                 done.add(key)
                 yield each.name, text, relaxed
+
+
+def _pairs(problem: States, look: Look, *, arms: bool) -> Iterator[str]:
+    """Yield a rule with another relaxation that are enough together; ``arms``: these too."""
+    rules = next(each for each in problem.every_filter if each.name == "rules")
+    for text, relaxed in rules.ways(problem):
+        for name, other, _ in _ways(relaxed, look, finished=False):
+            if arms or name != "arms":
+                how = f" (--rule {text} --rule {other})" if name == "rules" else ""
+                yield f"{text} together with {other}{how}"
 
 
 def _enough(problem: States, look: Look, name: str, text: str, relaxed: States) -> str:

@@ -216,6 +216,14 @@ def find_front(
     InfeasibleError, SolverError, TimeUpError
         If no plan is feasible; if values differ from those claimed, or a point is missing; if no
         plan is found in time.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
+    >>> worst = seqopt.CRITERIA["worst-ratio"]
+    >>> find_front(seqopt.pose(engine, seqopt.FreeRules(), worst, "F_largest,steps"))
+    <Front: 1 plans, complete; F_largest, steps, regrips>
     """
     formulation = as_formulation(formulation, "front")
     if not isinstance(problem, Problem):

@@ -9,7 +9,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
-from seqopt.graph.decisions import Decisions, pose_decisions
+from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.states.states import States, build_states, of_decisions, over_scenarios, within
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.filters import Filter
@@ -105,13 +105,6 @@ def graph_of(problem: Problem, *, moves: bool | None = None) -> States:
     if name not in problem.graphs:
         problem.graphs[name] = (_of_moves if of_moves else _of_states)(problem)
     found: States = problem.graphs[name]
-    return found
-
-
-def decisions_of(problem: Problem) -> Decisions:
-    """Return costs of the candidates of all moves, budgets included."""
-    found = graph_of(problem, moves=True).decisions
-    assert found is not None  # as is required of these
     return found
 
 

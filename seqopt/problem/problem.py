@@ -433,17 +433,6 @@ READ: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def _require_for_curing(problem: Any) -> None:
-    """Raise a `ProblemError` if mortar cures beside a requirement that is not modeled then."""
-    if problem.standing is None or problem.standing.curing is None:
-        return
-    wrong = [str(goal) for goal in problem.goals if goal.margins]
-    wrong += ["props"] if problem.network.scene.props else []
-    wrong += ["scenarios"] if problem.scenarios else []
-    if wrong:
-        raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")
-
-
 def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
     """Return the limits, checked to be on responses of a state."""
     limits = _step_limits(limits, network.scene)

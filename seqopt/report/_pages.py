@@ -155,8 +155,8 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
             draw = display(RegretTable, "plot")
             from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
 
-            tables.append((title, picture_files("", draw(speed))[".png"]))
-        tables.append((f"{title}, in numbers. {speed.sentence}", speed.table))
+            tables.append((speed.sentence, picture_files("", draw(speed))[".png"]))
+        tables.append((title, speed.table))
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
     return _page(engine, builds, sentence, tables)

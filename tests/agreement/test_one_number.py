@@ -20,7 +20,7 @@ from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge._schedules import plan_values
-from seqopt.plan.pose import decisions_of, states_of
+from seqopt.plan.pose import graph_of, states_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
@@ -88,7 +88,7 @@ def of_steps(problem, aim):
     found["F_largest"] = forces.fillna(0.0).to_numpy(float)
     rows = [{n: v[k : k + 1] for n, v in found.items()} for k in range(len(plan.steps))]
     each = [
-        float(decisions_of(problem).criterion.costs(row, step.bricks, 1)[0])
+        float(graph_of(problem, moves=True).decisions.criterion.costs(row, step.bricks, 1)[0])
         for row, step in zip(rows, plan.steps, strict=True)
     ]
     yield "steps", sum(each) if aim is Aim.SUM else max(each)
@@ -115,7 +115,7 @@ def test_ranks_are_of_open_grips_alone(schedule, aim):
     problem = posed(schedule, "ranks")
     found = dict(by_layers(problem, aim))
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
-    layers = decisions_of(problem)
+    layers = graph_of(problem, moves=True).decisions
     assert layers.given
     assert not len(layers.given_costs)
     with pytest.raises(ProblemError, match="it ranks the choices of a move"):
@@ -129,7 +129,7 @@ def test_a_given_step_that_the_criterion_forbids_leaves_no_plan():
         return np.full_like(responses["F_largest"], 1.0 if bricks > 1 else np.inf)
 
     problem = posed("three-robot")
-    assert decisions_of(problem).given[0].bricks == 1
+    assert graph_of(problem, moves=True).decisions.given[0].bricks == 1
     problem = problem.but(criterion=StepCost("several", ("F_largest",), several))
     with pytest.raises(InfeasibleError, match=r"criterion several: step 1, where no grip is left"):
         seqopt.solve(problem, "overlap_dp")
@@ -150,7 +150,7 @@ def ways(scene, steps):
 def test_travel_is_one_number(schedule):
     """The least that layers and states say, and what a budget says that each plan goes."""
     problem = posed(schedule)
-    layers, scene = decisions_of(problem), problem.scene
+    layers, scene = graph_of(problem, moves=True).decisions, problem.scene
     budget = travel(layers, np.inf)
     least = seqopt.solve(problem.but(goals="travel"))
     goes = states_of(problem.but(goals="travel"))
@@ -176,7 +176,7 @@ def test_travel_is_one_number(schedule):
 def test_ways_between_moves_that_are_not_neighbors_are_refused():
     """They were left out, so that any budget was kept."""
     with pytest.raises(ProblemError, match="from the grip of move 1 to that of move 3"):
-        travel(decisions_of(posed("two-robot")), 1.0)
+        travel(graph_of(posed("two-robot"), moves=True).decisions, 1.0)
     assert seqopt.solve(posed("two-robot").but(goals="travel")).objective["travel"] > 0
 
 
@@ -184,7 +184,7 @@ def test_ways_between_moves_that_are_not_neighbors_are_refused():
 def test_steps_over_a_level_are_those_of_the_plan(schedule):
     """Steps without an open grip count, as in the table of the plan."""
     problem = posed(schedule)
-    layers = decisions_of(problem)
+    layers = graph_of(problem, moves=True).decisions
     free = seqopt.solve(layers, "overlap_dp")
     known = of_table(free.responses(), "T_max")
     apart = np.unique(np.round(known, 3))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import permutations
 
 import numpy as np
 import pandas as pd
@@ -13,12 +12,11 @@ import pytest
 import seqopt
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.errors import FileError, ProblemError, SolverError, StepError
-from seqopt.graph._orders import among_orders, order_rules
+from seqopt.graph._orders import among_orders
 from seqopt.graph.states.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
-from seqopt.plan.plan import Status
 from seqopt.sequence.methods import SCHEDULES, sequential
 from seqopt.sequence.schedule_file import (
     find_schedule,
@@ -268,29 +266,6 @@ def peak_of(engine, steps):
     scales = np.array([scale for _, scale in ONES.limits])
     worst = [allowed(engine, DOWN, s.bricks, s.grips) for s in steps if s.bricks]
     return float((np.array(worst) / scales).max())
-
-
-@pytest.mark.slow
-def test_best_order_is_that_of_all():
-    engine = small_wall()
-    scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]
-    found = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax", orders="tied"))
-    among = among_orders(build_states(engine, DOWN, found.problem.criterion, "minmax"), "tied")
-    orders = [*filter(order_rules(among).allows, permutations(scene.build_order))]
-    values = [seqopt.solve(among.at(order)).objective["minmax"] for order in orders]
-    assert len(orders) > 1
-    assert found.objective["minmax"] == pytest.approx(min(values), rel=1e-9)
-    assert found.summary()["status"] == found.status == Status.OPTIMAL
-    steps = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax,steps", orders="tied"))
-    least = min(
-        seqopt.solve(replace(among, goals=steps.graph.goals).at(o)).objective["steps"]
-        for o, value in zip(orders, values, strict=True)
-        if value <= min(values) * 1.000001
-    )
-    assert steps.status == Status.OPTIMAL
-    assert steps.objective["steps"] == len(steps.steps) == least
-    assert found.steps[-1].bricks == 0
-    assert max(values) > min(values) * 1.01  # orders differ
 
 
 def test_judge_refuses_what_is_no_take_down():

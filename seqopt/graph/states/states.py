@@ -36,7 +36,6 @@ from seqopt.problem.problem import (
     Orders,
     RobustAim,
     _goals,
-    _require_for_curing,
     check_parts,
     checked_limits,
     of_states,
@@ -694,5 +693,11 @@ def _asked(problem: States) -> States:
     for goal in problem.goals:
         if goal.check is not None:
             goal.check(problem)
-    _require_for_curing(problem)
+    if problem.standing is None or problem.standing.curing is None:
+        return problem
+    wrong = [str(goal) for goal in problem.goals if goal.margins]
+    wrong += ["props"] if problem.network.scene.props else []
+    wrong += ["scenarios"] if problem.scenarios else []
+    if wrong:
+        raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")
     return problem

@@ -178,7 +178,7 @@ def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
     """Give axes their limits, a band of no regret, and the number of ways without a point."""
     times, most = seen["seconds"], max(float(seen["regret"].max()), 100 * LEAST)
     axes.set(xscale="log", yscale="log", xlim=(float(times.min()) / 2.2, 3.0 * float(times.max())))
-    axes.set(ylim=(NONE / 3, 12 * most), xlabel="time from scene to plan [s]", ylabel="regret")
+    axes.set(ylim=(NONE / 3, 60 * most), xlabel="time from scene to plan [s]", ylabel="regret")
     plain(axes.xaxis)
     ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1)]
     axes.set_yticks([NONE, *ticks], ["proven 0" if table.is_proven else "0", *map(percent, ticks)])
