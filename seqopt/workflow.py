@@ -236,6 +236,11 @@ class Part:
     missing : sequence of int, optional
         Brick that is not there: one that stood is placed again next, one that was still to come
         waits until all are placed that do not hang on it.
+
+    Examples
+    --------
+    >>> optimize("chain:bricks=7", Part(schedule="free", to=4)).steps[-1].bricks
+    4
     """
 
     schedule: Schedule | Path | str | None = None

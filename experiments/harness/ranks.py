@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.graph._decision_search import Windows
 from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.decisions import Decisions
+from seqopt.graph.decisions import Decisions, Windows
 from seqopt.problem.problem import Aim
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal

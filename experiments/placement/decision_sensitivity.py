@@ -36,8 +36,7 @@ from experiments.harness.ranks import rank_of
 from experiments.harness.results import drawn
 from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph._decision_search import Windows
-from seqopt.graph.decisions import Decisions, pose_decisions
+from seqopt.graph.decisions import Decisions, Windows, pose_decisions
 from seqopt.graph.formulation import find_formulation
 from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report._style import dress, looks, styled

@@ -11,16 +11,24 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, did_you_mean
+from seqopt.errors import (
+    InfeasibleError,
+    MechanismError,
+    NothingFoundError,
+    ProblemError,
+    SolverError,
+    TimeUpError,
+    did_you_mean,
+)
 from seqopt.graph.decision_costs import (
     Budget,
     Compiled,
@@ -32,6 +40,7 @@ from seqopt.graph.decision_costs import (
     compile_totals,
     largest_of,
 )
+from seqopt.graph.formulation import Watch
 from seqopt.problem.criteria import Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import WORST_PEAK, Aim, AskedBudget, RobustAim
 from seqopt.problem.requirements import (
@@ -52,6 +61,7 @@ from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step
+from seqopt.work._workers import keep
 
 
 @dataclass(frozen=True, repr=False)
@@ -415,3 +425,56 @@ def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
         for ends in pairwise(grip for grip in grips if grip is not None):
             if ends[0] != ends[1]:
                 yield robot.name, ends
+
+
+@dataclass(frozen=True, repr=False)
+class Windows(Terse):
+    """The steps that every move decides, after the choice before it; solved when first asked for.
+
+    ``choice``: the chosen candidate of every move so far.
+    """
+
+    problem: Decisions
+    choice: list[int] = field(default_factory=list)
+
+    def costs(self, move: int, aim: Aim = Aim.SUM) -> Floats:
+        """Return costs (C_k,) of the candidates of a move after the choices before it."""
+        before = self.choice[move - 1] if move else 0
+        costs = self.problem.possible_after(move, before)
+        for choices in self.problem.window_choices(move, before):
+            costs = aim.join(costs, self.problem.step_costs(choices))
+        return costs
+
+    def so_far(self) -> str:
+        """Return the kind of choice, in a few words."""
+        if not self.choice:
+            return "no move was chosen yet"
+        moves = self.problem.schedule.moves
+        nodes = (str(moves[k].candidates[i]) for k, i in enumerate(self.choice))
+        return f"{len(self.choice)} of {len(moves)} moves were chosen, at nodes {' '.join(nodes)}"
+
+
+def walk_windows(problem: Decisions, watch: Watch) -> Windows:
+    """Choose the candidate of least cost, one move after the other (equation 1 of Bruun et al.).
+
+    Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
+    others may have led on; `TimeUpError` if time is over before the last move is chosen;
+    `WorkerError`; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
+    """
+    found, resources = Windows(problem), problem.evaluation.resources
+    try:
+        with keep(resources.executor, resources.workers):
+            for k, move in enumerate(problem.schedule.moves):
+                if watch.over:
+                    raise TimeUpError(f"{watch.seconds:.3g} s: {found.so_far()}; give more")
+                costs = found.costs(k)
+                if not np.isfinite(costs).any():
+                    raise NothingFoundError(
+                        f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after "
+                        "the choices before it; relax a limit, or let a formulation look at all "
+                        "choices"
+                    )
+                found.choice.append(int(np.argmin(costs)))
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(found.so_far()) from stop
+    return found

@@ -50,7 +50,7 @@ from seqopt.sequence.steps import Step
 from seqopt.work.progress import INTERRUPT
 
 if TYPE_CHECKING:
-    from seqopt.graph._decision_search import Windows
+    from seqopt.graph.decisions import Windows
 
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 Result = TypeVar("Result")

@@ -15,8 +15,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
-from seqopt.graph._decision_search import Windows
-from seqopt.graph.decisions import Decisions
+from seqopt.graph.decisions import Decisions, Windows
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States

@@ -23,8 +23,7 @@ from seqopt.errors import (
     StepError,
     message_of,
 )
-from seqopt.graph._decision_search import walk_windows
-from seqopt.graph.decisions import Decisions
+from seqopt.graph.decisions import Decisions, walk_windows
 from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States, of_decisions

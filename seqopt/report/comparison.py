@@ -125,6 +125,14 @@ def compare(
     Returns
     -------
     Comparison
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> wall = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
+    >>> found = compare(wall, seqopt.CRITERIA["worst-ratio"])
+    >>> float(found.table.loc["sequential", "F_rob"].round(1))  # N
+    37.3
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)

@@ -15,8 +15,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
-from seqopt.graph._decision_search import walk_windows
-from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.decisions import pose_decisions, walk_windows
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
 from seqopt.graph.states.states import build_states
 from seqopt.plan.solve import solve

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from formulations.states._search import _Totals
 from seqopt.graph import Graph
-from seqopt.graph._decision_search import Windows
 from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.decision_costs import best_in_order
-from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.decisions import Windows, pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.plan.solve import solve

@@ -17,9 +17,8 @@ from seqopt.errors import (
     ProblemError,
     SolverError,
 )
-from seqopt.graph._decision_search import Windows, walk_windows
 from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.graph.decisions import pose_decisions
+from seqopt.graph.decisions import Windows, pose_decisions, walk_windows
 from seqopt.graph.formulation import (
     FormulationKind,
     Solution,
