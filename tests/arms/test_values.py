@@ -1,4 +1,4 @@
-"""Arms as values, in scene files, and what is said where they cannot be."""
+"""Arms as values; arms whose joints give way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command ``assess``: mortars, and what enters no verdict."""
+"""The command ``assess``; a limit of time."""
 
 from __future__ import annotations
 

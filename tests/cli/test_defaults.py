@@ -1,4 +1,4 @@
-"""What is taken where nothing is asked for: the same in Python and on the command line."""
+"""What is taken where nothing is asked for; scenes on the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The three forms of an answer: text for people, paths alone, and JSON for scripts."""
+"""The three forms of an answer; where the command line reads and writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The free schedule, take-downs, scenarios and Pareto sets on the command line."""
+"""The free schedule; parts of builds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people read first, and that what messages call enough is enough."""
+"""What people read first; commands of packages and users."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Large problems from the command line: workers, little memory, interrupts; a line each."""
+"""Large problems from the command line; how a command ends."""
 
 from __future__ import annotations
 

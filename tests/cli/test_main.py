@@ -1,4 +1,4 @@
-"""The command line as a user meets it, and what its results came from."""
+"""The command line as a user meets it; a step that is a mechanism is said to be one."""
 
 from __future__ import annotations
 

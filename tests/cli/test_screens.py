@@ -1,4 +1,4 @@
-"""Help, its examples, and the word that was meant."""
+"""Help; what a person sees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Phrases that newcomers stumbled over stay out of pages, docstrings and messages."""
+"""Phrases that newcomers stumbled over stay out of pages; what a forge and a maintainer find."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis says of sound, ill-conditioned and loose structures, and of spoiled fields."""
+"""What a diagnosis says of sound; exactly rigid bricks where joints are loose."""
 
 from __future__ import annotations
 

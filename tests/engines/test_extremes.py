@@ -1,4 +1,4 @@
-"""Extremes of fields without the fields, by compiled loops."""
+"""Extremes of fields without the fields; grips that are not where they should be."""
 
 from __future__ import annotations
 

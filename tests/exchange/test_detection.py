@@ -1,4 +1,4 @@
-"""Where blocks touch: areas in closed form, pieces that are convex, and joints over them."""
+"""Where blocks touch; blocks of a mesh are found where its faces close."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks of robots: what each does in every step, and frames that follow from the bricks."""
+"""Tasks of robots; plans go into the formats of others; blocks that interpenetrate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claims: how they are declared, listed and run; each at reduced size ends with its verdict."""
+"""Claims; counterparts of the paper's figures and tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conformance: what every registered formulation does, on random problems and on arches."""
+"""Conformance; what exact formulations share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conformance: what every formulation of the free schedule that finds a plan does."""
+"""Conformance; a puzzle without bricks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Costs and budgets as arrays: sums, peaks, what can be continued, and what is refused."""
+"""Costs and budgets as arrays; paths."""
 
 from __future__ import annotations
 

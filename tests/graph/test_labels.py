@@ -1,4 +1,4 @@
-"""Searches of labels and of states that pass, against every path."""
+"""Searches of labels and of states that pass; ranks over all pairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is proven of budgets: bounds, conflicts, what they cost."""
+"""What is proven of budgets; proofs are as strong as they promise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What judges free schedules and Pareto sets sees what is wrong, and says what bounds rest on."""
+"""What judges free schedules and Pareto sets sees what is wrong; the judge is attacked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The proof of free schedules: its tables against rules in plain words, its bounds."""
+"""The proof of free schedules; what a formulation claims is recomputed."""
 
 from __future__ import annotations
 

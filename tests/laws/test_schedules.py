@@ -1,4 +1,4 @@
-"""Laws of methods and schedules, with any robots on any build: possible, held, never adrift."""
+"""Laws of methods and schedules; laws of the ground ends."""
 
 from __future__ import annotations
 

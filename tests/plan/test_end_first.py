@@ -1,4 +1,4 @@
-"""States that every plan passes are asked before any plan is sought, the whole first."""
+"""States that every plan passes are asked before any plan is sought; formulations of schedules."""
 
 from __future__ import annotations
 

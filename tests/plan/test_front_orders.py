@@ -1,4 +1,4 @@
-"""A problem as a flow, by hand: arcs, balance, units, bounds; and when a budget is hopeless."""
+"""A problem as a flow; plans of robots that give way."""
 
 from __future__ import annotations
 

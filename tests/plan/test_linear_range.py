@@ -1,4 +1,4 @@
-"""The linear range as a limit of plans: kept wherever one keeps it, said where none does."""
+"""The linear range as a limit of plans; one way from a problem."""
 
 from __future__ import annotations
 

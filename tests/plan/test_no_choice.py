@@ -1,4 +1,4 @@
-"""Problems without a choice, and formulations that return nonsense or raise."""
+"""Problems without a choice; the search that solves only the models it meets."""
 
 from __future__ import annotations
 

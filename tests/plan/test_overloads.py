@@ -1,4 +1,4 @@
-"""What is promised of every step: payloads and limits, and what helps where they are exceeded."""
+"""What is promised of every step; one way to solve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans with props: by brute force, and judged."""
+"""Plans with props; what becomes of a plan where something has changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Amounts, filters and budgets of users: asked for by name or in words, judged by their twins."""
+"""Amounts; what criteria make of responses."""
 
 from __future__ import annotations
 

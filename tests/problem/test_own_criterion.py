@@ -1,4 +1,4 @@
-"""Criteria people bring: functions of responses, aims in their order, quantiles over steps."""
+"""Criteria people bring; what criteria take from a scene."""
 
 from __future__ import annotations
 

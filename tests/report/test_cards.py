@@ -1,4 +1,4 @@
-"""What a notebook shows: what a value says, escaped, light, with pictures."""
+"""What a notebook shows; what a page opens with; every plan says what it took."""
 
 from __future__ import annotations
 

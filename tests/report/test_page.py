@@ -1,4 +1,4 @@
-"""The page with the step viewer: its numbers are those of the tables, and a browser shows them."""
+"""The page with the step viewer; robots that are drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Processes, executors and little memory: the same results."""
+"""Processes; robots' columns and responses collide with nothing."""
 
 from __future__ import annotations
 

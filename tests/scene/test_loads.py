@@ -1,4 +1,4 @@
-"""Loads, wind and movements in scenes: files, refusals, scenarios, and what is told of them."""
+"""Loads; orders of a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Schedules of one's own, from files."""
+"""Schedules of one's own; take-downs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verdicts of steps apart from their margins: what is asked for is found, nothing else changes."""
+"""Verdicts of steps apart from their margins; verdicts of many steps."""
 
 from __future__ import annotations
 

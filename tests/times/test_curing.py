@@ -1,4 +1,4 @@
-"""Mortar that cures: least times by enumeration, limits, and a judge that looks again."""
+"""Mortar that cures; laws of time."""
 
 from __future__ import annotations
 

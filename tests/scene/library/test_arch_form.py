@@ -1,4 +1,4 @@
-"""Arches by span and rise, against their closed forms; scenes in words."""
+"""Arches by span and rise; where faces overlap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Built-in scenes: what they promise, and the vault of Bruun et al. as it is reconstructed."""
+"""Built-in scenes; laws of generated scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws of the free schedule: what never makes it worse, and what changes nothing."""
+"""Laws every engine obeys; laws of the free schedule; units and scale change no choice."""
 
 from __future__ import annotations
 
