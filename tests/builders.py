@@ -330,3 +330,18 @@ def lacking(assembly, mortar, compiled):
     """The brackets of the least bond that a structure lacks; it stands at zero."""
     case = bonded(assembly, mortar)
     return HeldStates(assembly, case, compiled, case.fixed())
+
+
+class Counting:
+    """An engine that counts the grip sets it is asked for."""
+
+    def __init__(self, engine):
+        self.engine, self.sets = engine, 0
+
+    @property
+    def network(self):
+        return self.engine.network
+
+    def solve(self, bricks, grips, want=Want.RESPONSES):
+        self.sets += len(grips)
+        return self.engine.solve(bricks, grips, want)

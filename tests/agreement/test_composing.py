@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
-from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
 from seqopt.graph.decisions import pose_decisions, walk_windows
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
@@ -29,7 +28,7 @@ from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.brute_force import FOUR, ONES, allowed, distance, whole_graph
-from tests.builders import small_arch
+from tests.builders import Counting, small_arch
 
 
 class Ticking(Watch):
@@ -41,21 +40,6 @@ class Ticking(Watch):
     def seconds(self):
         self.ticks += 1
         return float(self.ticks)
-
-
-class Counting:
-    """An engine that counts the grip sets it is asked for."""
-
-    def __init__(self, engine):
-        self.engine, self.sets = engine, 0
-
-    @property
-    def network(self):
-        return self.engine.network
-
-    def solve(self, bricks, grips, want=Want.RESPONSES):
-        self.sets += len(grips)
-        return self.engine.solve(bricks, grips, want)
 
 
 FIRST, *OTHERS = CRITERIA

@@ -10,7 +10,6 @@ import pytest
 
 import seqopt
 from seqopt import Search
-from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.decision_costs import LayeredCosts
 from seqopt.graph.decisions import pose_decisions
@@ -21,7 +20,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
 from seqopt.workflow import Robust
-from tests.builders import small_arch
+from tests.builders import Counting, small_arch
 from tests.layered import Costs
 
 
@@ -124,21 +123,6 @@ def test_a_free_schedule_says_so_too():
 WORST = seqopt.CRITERIA["worst-ratio-published"]
 
 
-class Counting:
-    """An engine that counts the grip sets it is asked for."""
-
-    def __init__(self, engine):
-        self.engine, self.asked = engine, 0
-
-    @property
-    def network(self):
-        return self.engine.network
-
-    def solve(self, bricks, grips, want=Want.RESPONSES):
-        self.asked += len(grips)
-        return self.engine.solve(bricks, grips, want)
-
-
 @pytest.fixture
 def counted(engine25):
     engine = Counting(engine25)
@@ -147,20 +131,20 @@ def counted(engine25):
 
 def test_posing_computes_nothing(counted):
     engine, problem = counted
-    assert engine.asked == 0
-    assert problem.evaluation.models == engine.asked > 0
+    assert engine.sets == 0
+    assert problem.evaluation.models == engine.sets > 0
 
 
 def test_a_search_without_proof_computes_only_what_it_meets(counted):
     engine, problem = counted
     plan = seqopt.solve(problem, "cascade", proof=False)
-    assert plan.models == engine.asked
+    assert plan.models == engine.sets
     assert plan.certificate is None
     assert np.isnan(plan.selection.objective).all()
     proven = seqopt.solve(problem, "cascade")
     assert plan.nodes == proven.nodes
     assert plan.steps == proven.steps
-    assert engine.asked > problem.evaluation.models
+    assert engine.sets > problem.evaluation.models
     assert plan.models < 0.3 * problem.evaluation.models
     assert plan.summary()["status"] == "unproven"
     assert plan.summary()["gap"] is None
