@@ -6,7 +6,8 @@ and supports where the file has none; ``seqopt optimize``, the loop of three rob
 `overlap_dp`, or the free schedule where there are fewer than four blocks; ``seqopt export`` in
 every format. Steps of the plan, up to 12 spread over the build and the last, are put to the
 certificate of stability with mortar on the true faces. Of more than 120 blocks, nodes at most 6
-joints from the newest are candidates, of more than 300 those at most 3 away.
+joints from the newest are candidates, of more than 300 those at most 3 away. Of one file every plan
+lies outside the linear range: the limit is lifted for it, and its plan says so.
 
 The claim holds if every file ends in a plan whose choice is proven optimal among its candidates and
 that goes out in every format, or in one line; at least eight have such a plan; no verdict on a step
@@ -25,7 +26,7 @@ import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -64,6 +65,7 @@ class Outside:
     source: str
     path: str
     words: tuple[str, ...] = ("--unit", "m", "--density", "2400")
+    asked: tuple[str, ...] = ()  # of ``seqopt optimize``
 
     @property
     def name(self) -> str:
@@ -88,7 +90,9 @@ SAMPLES = (
     *(_sample(kind, "0") for kind in ("cube-curve-short", "cube-curve-tall", "cubes")),
     _sample("snake", "0", "--gap", "0.01"),
     _sample("armadillo", "", OVERLAP),  # it marks no supports, and nothing in it stands level
-    _sample("armadillo_cra", "", OVERLAP),  # it marks them
+    replace(  # it marks them; its blocks move farther than the model holds, whatever is chosen
+        _sample("armadillo_cra", "", OVERLAP), asked=("--limit", "linear_range=any")
+    ),
 )
 
 
@@ -170,7 +174,8 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
     kind = sniffed(json.loads(path.read_text("utf-8")), path.name) if kind == "json" else kind
     row |= {"format": kind, "bricks": len(scene.bricks)}
     row |= {"faces": sum(spring.face is not None for spring in springs)}
-    status, said = run("optimize", str(scene_file), *_how(scene), "--out", str(plan))
+    how = (*_how(scene), *outside.asked, "--out", str(plan))
+    status, said = run("optimize", str(scene_file), *how)
     if status:
         return row | {"outcome": "no plan", "said": said}
     summary = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
