@@ -127,7 +127,6 @@ BEAM = on_graph(
     FormulationKind.HEURISTIC,
     aim=Aim.SUM,
     alone=True,
-    search=_of_states,
 )
 PATH_BEAM = on_graph(
     "path_beam",

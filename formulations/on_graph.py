@@ -30,7 +30,7 @@ from formulations.states._search import (
 )
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.paths import path_values, tied
@@ -86,6 +86,7 @@ class OnGraph(Terse):
     choose: Choose = field(repr=False)
     takes_budgets: bool
     search: Callable[..., Solution] | None = field(default=None, repr=False)
+    alone: bool = False
 
     @property
     def __signature__(self) -> inspect.Signature:
@@ -127,11 +128,18 @@ class OnGraph(Terse):
             own = {name: p.default for name, p in self._own_options().items()} | options
             return self.search(problem, watch, tell, **own)
         if problem.budgets and not self.takes_budgets:
-            able = "schedule_search or path_beam"
-            raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
+            able = [name for name, each in formulations("goals").items() if each.takes_budgets]
+            budget = problem.names[len(problem.aims)]
+            raise ProblemError(
+                f"{self.name}: the budget {budget!r} couples all moves; use {' or '.join(able)}"
+            )
         if problem.totals:
             return best_total(problem, choose, watch, tell)
-        return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)
+
+        def search(rest: States) -> Solution:
+            return chosen(rest, choose, watch, tell, alone=self.alone)
+
+        return after_margins(problem, search, tell)
 
 
 __all__ = [
@@ -182,5 +190,5 @@ def on_graph(  # noqa: PLR0913  # the fields of a formulation
     -------
     Formulation
     """
-    solve = OnGraph(name, choose, takes_budgets, search)
+    solve = OnGraph(name, choose, takes_budgets, search, alone)
     return Formulation(name, summary, kind, aim, solve, takes_budgets, windowed, answers, alone)

@@ -40,7 +40,9 @@ from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import (
     Best,
+    Contracted,
     _on_paths,
+    contracted,
     distances,
     lexicographic,
     moves_along,
@@ -86,17 +88,22 @@ def best_total(
                 return best_total(problem, choose, watch, tell)
             raise found.without_plan("no plan is allowed")
         visited = found.graph()
-        graph = visited.graph.only(_on_paths(visited.graph))
-        best = least_total(graph, problem.over, cheapest_by(choose, watch), watch)
+        short = _decisions(problem, visited.graph)
+        best = least_total(short.graph, problem.over, cheapest_by(choose, watch), watch)
     except StopError as stop:
         raise _too_little(stop) from None
-    plan = selected(space, visited, Best(best.path, (best.value,)))
+    plan = selected(space, visited, Best(short.expanded(best.path), (best.value,)))
     prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
     return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
 
 
-def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Solution:
-    """Return the plan of a choice; where time was over, the better one of it and the incumbent."""
+def chosen(
+    problem: States, choose: Choose, watch: Watch, tell: Watching, *, alone: bool = False
+) -> Solution:
+    """Return the plan of a choice; where time was over, the better one of it and the incumbent.
+
+    ``alone``: whether it is charged as of `Graph.alone`, where grips are open.
+    """
     first = None
     try:
         first = narrow(problem, WIDTH, tell)
@@ -106,19 +113,38 @@ def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> Sol
         wide.refine()
         graph, states = wide.graph()
         graph = replace(graph, caps=problem.budgets)
+        if alone and problem.rules.names_robots() and problem.goals[0].of_criterion:
+            own = [problem.candidates.charges(level, rows) for level, _, rows in states]
+            graph = replace(graph, alone=np.concatenate(own)[graph.target])
+        short = _decisions(problem, graph)
         with answered(watch.interrupt):
-            best = choose(graph.only(_on_paths(graph)), watch)
+            best = choose(short.graph, watch)
     except (StopError, KeyboardInterrupt) as stop:
         return plan_by_then(first, stop)
-    stopped = ("interrupt" if watch.interrupted else "time") * best.stopped
+    stopped = "interrupt" if watch.interrupted else "time" * best.stopped
     if best.path:
-        values = path_values(graph, best.path)
-        found = selected(wide.space, Visited(graph, states), Best(best.path, values))
+        path = short.expanded(best.path)
+        values = path_values(graph, path)
+        found = selected(wide.space, Visited(graph, states), Best(path, values))
     if not best.path or (first and best.stopped and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
     known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
     bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
-    return replace(found, bound=bound, stopped=stopped, prices=best.prices)
+    return replace(
+        found,
+        bound=bound,
+        stopped=stopped,
+        prices=best.prices,
+        compile_seconds=best.compile_seconds,
+    )
+
+
+def _decisions(problem: States, graph: Graph) -> Contracted:
+    """Return the moves on paths to ends; where grips are open each with the forced ones behind."""
+    kept, every = graph.only(_on_paths(graph)), np.arange(graph.states)
+    if problem.rules.moves:
+        return contracted(kept)
+    return Contracted(kept, every, kept.target.astype(np.int64), every)
 
 
 def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
@@ -132,7 +158,7 @@ def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
         share = found.level / problem.space.levels
         progress(Stage(f"states, pass {found.passes}", share))
         if watch.over:
-            raise StopError("time")
+            raise KeyboardInterrupt if watch.interrupted else StopError("time")
         nonlocal asked
         used = COPIES * (found.nbytes + problem.nbytes)
         if used > watch.memory:

@@ -17,6 +17,7 @@ from seqopt.graph.graph import Graph, Rows
 from seqopt.problem.problem import Aim
 from seqopt.problem.resources import Resource, StepArrays
 from seqopt.scene.scene import Order
+from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
     from seqopt.graph.graph import TimedGraph
@@ -81,7 +82,7 @@ class Instance(FrozenValue, Shown):
     --------
     >>> import seqopt
     >>> seqopt.compile_instance(seqopt.optimize("arch25").problem)
-    <Instance 'arch25': 493 nodes, 12453 arcs, least sum>
+    <Instance 'arch25': 493 nodes, 12453 arcs, sum>
     """
 
     name: str
@@ -119,7 +120,7 @@ class Instance(FrozenValue, Shown):
         capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
         return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
 
-    title, among, candidates, scenarios = "", "", (), ()  # of no scene
+    title, among, scenarios = "", "", ()  # of no scene
     models, standing, begin = 0, None, None
 
     @property
@@ -156,25 +157,24 @@ class Instance(FrozenValue, Shown):
             )
         return found
 
-    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
-        """Return the names of the goals."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the goals."""
         return tuple(goal.name for goal in self.goals)
 
-    def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
+    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names."""
-        return dict(zip(self.names_of(aim), values, strict=False))
+        return dict(zip(self.names, values, strict=False))
 
     def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
         """Return the bounds of goals."""
         return bounds
 
-    def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    def chosen_nodes(
+        self, steps: Sequence[Step], states: Sequence[Sequence[int]]
+    ) -> tuple[int, ...]:
         """Return the nodes of a path."""
         return tuple(state[-1] for state in states)
-
-    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Raise a `ProblemError`: an instance has no moves."""
-        return self.alone_in_scene
 
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged plan is optimal though it has a gap: never."""

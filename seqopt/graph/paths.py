@@ -159,6 +159,78 @@ def _on_paths(graph: Graph) -> Bools:
     return np.asarray(reached(graph)[graph.source] & to_end[graph.target])
 
 
+class Contracted(NamedTuple):
+    """A graph whose moves are decisions: each with the forced moves behind it.
+
+    Attributes
+    ----------
+    graph : Graph
+        A state for the start and for what decisions lead to.
+    kept : (n,) int
+        Which states of the whole graph these are: the next with several successors; where
+        decisions of one state lead to the same one, those that they enter first.
+    enters : (m,) int
+        The state of the whole graph that each move enters first.
+    after : (N,) int
+        Of every state of the whole graph the successor, where that is forced; else itself.
+    """
+
+    graph: Graph
+    kept: Ints
+    enters: Ints
+    after: Ints
+
+    def expanded(self, path: Sequence[int]) -> tuple[int, ...]:
+        """Return a path of decisions with all states that it passes in the whole graph."""
+        first = self._chain(0)[1:] if path else []
+        entered = self.enters[moves_along(self.graph, path)].tolist()
+        return (*first, *(state for begin in entered for state in self._chain(begin)))
+
+    def _chain(self, state: int) -> list[int]:
+        out = [state]
+        while (following := int(self.after[out[-1]])) != out[-1]:
+            out.append(following)
+        return out
+
+
+def contracted(graph: Graph) -> Contracted:
+    """Return the graph of decisions: a state with one successor is passed by the move into it.
+
+    ``graph``: all of its moves are on paths from the start to an end, so that no cycle is forced.
+    """
+    columns, joins = graph.amounts, np.array([*graph.peaks, graph.peaks[0], graph.peaks[0]])
+    if graph.alone is not None:
+        columns = np.column_stack([columns, graph.alone])
+    joins, count = joins[: columns.shape[1]], len(graph.peaks)
+    nothing, states = np.where(joins, -np.inf, 0.0), np.arange(graph.states)
+    forced = (np.bincount(graph.source, minlength=graph.states) == 1) & ~graph.ends
+    only, after, total = forced[graph.source], states.copy(), np.tile(nothing, (graph.states, 1))
+    after[graph.source[only]], total[graph.source[only]] = graph.target[only], columns[only]
+    end = after.copy()
+    while (end != end[end]).any():
+        total = np.where(joins, np.maximum(total, total[end]), total + total[end])
+        end = end[end]
+    if graph.ends[end[0]]:  # nothing is left to decide: one move leads there
+        forced[0], after[0], end[0], total[0] = False, 0, 0, nothing
+    free = ~forced[graph.source]
+    leads = end[graph.target]
+    pairs = graph.source[free].astype(np.int64) * graph.states + leads[free]
+    distinct, times = np.unique(pairs, return_counts=True)
+    apart = np.isin(states, distinct[times > 1] % graph.states)
+    stands_for = np.where(apart[leads], graph.target, leads)
+    kept = np.unique([0, *stands_for[free].tolist()])
+    row, move = moves_out(graph, end[kept])
+    taken = [columns[move], total[graph.target[move]], np.where(row[:, None], nothing, total[0])]
+    joined = np.where(joins, np.max(taken, axis=0), np.sum(taken, axis=0))
+    target = np.searchsorted(kept, stands_for[move])
+    order = np.lexsort((target, row))
+    joined, arcs = joined[order], (row[order].astype(np.int32), target[order].astype(np.int32))
+    alone = None if graph.alone is None else joined[:, count:]
+    ends = graph.ends[end[kept]]
+    small = Graph(*arcs, joined[:, :count], graph.peaks, ends, graph.caps, alone)
+    return Contracted(small, kept, graph.target[move][order].astype(np.int64), after)
+
+
 def moves_out(graph: Graph, states: Ints) -> tuple[Ints, Ints]:
     """Return the moves that lead from states (n,): from which row each does, and its number."""
     numbers = np.arange(graph.states + 1).astype(graph.source.dtype)

@@ -219,6 +219,27 @@ def worst(response: str) -> Amount:
     return Amount(response, _Response(response), is_peak=True, responses=(response,), show=show)
 
 
+@dataclass(frozen=True)
+class _Over:
+    """One for every state in which a response is above a level; none where no robot holds."""
+
+    response: str
+    level: float
+
+    def __call__(self, states: StateArrays) -> Floats:
+        return (states.responses[self.response] > self.level).astype(float)
+
+
+def steps_over(response: str, level: float) -> Amount:
+    """Return the number of steps in which a response is above a level, SI units."""
+
+    def again(states: StateArrays) -> Floats:
+        return np.heaviside(np.nan_to_num(states.responses[response] - level, nan=-1.0), 0.0)
+
+    name = f"steps_over:{response}={level:g}"
+    return Amount(name, _Over(response, level), responses=(response,), twin=again)
+
+
 def _one(moves: MoveArrays) -> Floats:
     return np.ones(len(moves.regrips))
 

@@ -216,9 +216,9 @@ class WeightedSum(Terse):
         return replace(self, name=name, terms=terms)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the weighted sums, NaN where a choice is impossible."""
-        parts = [
-            weight / _known(scale, self.name) * _present(responses[name])
+        """Return the weighted sums, NaN where a choice is impossible; no part is below zero."""
+        parts = [  # the largest tension is below zero where all edges are compressed
+            weight / _known(scale, self.name) * np.maximum(_present(responses[name]), 0.0)
             for name, weight, scale in self.terms
         ]
         return np.asarray(sum(parts))

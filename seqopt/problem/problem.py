@@ -21,8 +21,8 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals
-from seqopt.problem.criteria import RankSum
+from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, steps_over
+from seqopt.problem.criteria import RankSum, _counts_every_step
 from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
@@ -54,10 +54,6 @@ class Aim(Enum):
     def join(self) -> np.ufunc:
         """How costs go together."""
         return np.add if self is Aim.SUM else np.maximum
-
-    def costs(self, decisions: Any) -> Any:
-        """Return the costs of candidates that this aim is about: sums or peaks."""
-        return decisions.sums if self is Aim.SUM else decisions.peaks
 
 
 class RobustKind(Enum):
@@ -168,66 +164,53 @@ BUDGET = re.compile(
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>[msx]?)"
 )
 COUNTED = ("steps_over", "robot_use")  # a response or a robot, and a level
-CAPS = "travel=3.5m, makespan=600s, regrips=2, steps=50 or sum(T_max)=900, say"
-FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
+CAPS = (
+    "travel=3.5m, makespan=600s, regrips=2, steps=50, sum(T_max)=900, robot_use:rob1=100:5, "
+    "steps_over:F_largest=250:10 or, of what the best plan without budgets takes, travel=0.8"
+)
 
 
 @dataclass(frozen=True)
-class AskedBudget:
-    """A budget, parsed."""
+class Budget:
+    """A cap on an amount: ``bound`` in SI units, or a share of what the best plan without takes."""
 
-    words: str
-    name: str  # of what is capped
-    response: str  # whose steps over a level are counted; empty for other totals
-    level: float  # SI units
-    bound: float  # how much there is
-    share: bool  # whether that is a share of what the optimum without budgets takes
+    amount: Amount
+    bound: float
+    share: bool = False
 
 
-def parse_budgets(
-    texts: Sequence[str] | str, *, of_states: bool = False
-) -> tuple[AskedBudget, ...]:
-    """Return budgets from words, SI units.
-
-    ``of_states``: whether they cap totals of states, in words of `CAPS`, or of candidates, in words
-    of `FORMS`, of which ``travel=0.8`` and ``0.8x`` are shares.
-    """
-    texts, forms = (texts,) if isinstance(texts, str) else texts, CAPS if of_states else FORMS
-    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
-        raise ProblemError(f"budgets {short(texts)}: give {forms}, as words")
-    found = [_parse(text, of_states=of_states) for text in texts]
-    about = [(budget.response or budget.name, budget.level) for budget in found]
-    for i, budget in enumerate(found):
-        if about[i] in about[:i]:
-            raise ProblemError(f"budget {budget.words}: it stands there twice; give one bound")
+def parse_budgets(given: Sequence[str | Budget] | str | Budget) -> tuple[Budget, ...]:
+    """Return budgets that are given as such, or in words as of `CAPS`."""
+    some = (given,) if isinstance(given, str | Budget) else given
+    if not isinstance(some, Sequence) or not all(isinstance(each, str | Budget) for each in some):
+        raise ProblemError(f"budgets {short(some)}: give {CAPS}, as words")
+    found = [_parse(each) if isinstance(each, str) else each for each in some]
+    names = [each.amount.name for each in found]
+    for each, name in zip(some, names, strict=True):
+        if names.count(name) > 1:
+            raise ProblemError(f"budget {each}: it stands there twice; give one bound")
     return tuple(found)
 
 
-def _parse(text: str, *, of_states: bool) -> AskedBudget:
-    found = BUDGET.fullmatch(text)
+def _parse(text: str) -> Budget:
+    found, known = BUDGET.fullmatch(text), {**BUILT_IN, **registered(Amount)}
     name = found["name"] if found else re.split("[=:]", text)[0]
-    whole = found is not None and not (found["of"] or found["level"])
-    unit = found["unit"] if found else ""
-    amount = BUILT_IN.get(name) or registered(Amount).get(name) if of_states else None
-    if of_states and not (whole and unit == (amount.unit if amount else "")):
-        raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
-    counted = found is not None and name in COUNTED and bool(found["of"] and found["level"])
-    if found is None or not (of_states or counted or (whole and name == "travel" and unit != "s")):
-        hint = did_you_mean(name, ("travel", *COUNTED))
-        states = f", or with an aim {CAPS}" if whole else ""
-        raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}{states}")
-    if counted and unit == "m":
-        raise ProblemError(f"budget {text}: steps have no meters; give a number of them")
-    response = found["of"] or ""
-    level, bound = (_positive(found[part] or "0", text) for part in ("level", "bound"))
-    return AskedBudget(
-        text,
-        name,
-        robot_response(response) if name == "robot_use" else response,
-        level,
-        bound,
-        share=not of_states and (unit == "x" or (name == "travel" and not unit)),
-    )
+    if found is None or name not in (*known, *COUNTED):
+        hint = did_you_mean(name, (*known, *COUNTED))
+        raise ProblemError(f"budget {short(text)} does not exist{hint}; give {CAPS}")
+    bound, share = _positive(found["bound"], text), found["unit"] == "x"
+    if name in COUNTED:
+        if not (found["of"] and found["level"]) or found["unit"] in ("m", "s"):
+            raise ProblemError(
+                f"budget {text}: name what is counted, a level and a number of steps"
+            )
+        response = robot_response(found["of"]) if name == "robot_use" else found["of"]
+        return Budget(steps_over(response, _positive(found["level"], text)), bound, share)
+    amount = known[name]
+    share |= name == "travel" and not found["unit"]
+    if found["of"] or found["level"] or not (share or found["unit"] == amount.unit):
+        raise ProblemError(f"budget {text}: give {name}=NUMBER{amount.unit}")
+    return Budget(amount, bound, share)
 
 
 def _positive(text: str, words: str) -> float:
@@ -235,7 +218,7 @@ def _positive(text: str, words: str) -> float:
     with suppress(ValueError):
         value = float(text)
     if not (np.isfinite(value) and value >= 0):
-        raise ProblemError(f"budget {words}: {text!r} is not a number from 0; give {FORMS}")
+        raise ProblemError(f"budget {words}: {text!r} is not a number from 0; give {CAPS}")
     return value
 
 
@@ -277,8 +260,8 @@ class Problem(Shown):
         What states must pass beside these.
     paths : tuple of Resource
         What plans must keep from the first step to the last.
-    budgets : tuple of str
-        Caps on totals over the build, in words.
+    budgets : tuple of Budget
+        Caps on totals over the build.
     stands : Standing or None
         The demand that every state stands.
     scenarios : tuple of Scene
@@ -287,10 +270,8 @@ class Problem(Shown):
         What counts of the values in all scenarios.
     orders : Orders or None
         Among which build orders the best is sought; None for the scene's own.
-    also : tuple of str
-        Further responses to compute, besides those that are needed.
     resources : Resources
-        Processes, memory and a folder for results.
+        Processes, own or of an executor.
 
     Examples
     --------
@@ -307,12 +288,11 @@ class Problem(Shown):
     criterion: Criterion
     goals: tuple[Amount, ...] = ()
     limits: tuple[Limit, ...] = ()
-    budgets: tuple[str, ...] = ()
+    budgets: tuple[Budget, ...] = ()
     stands: Standing | None = None
     scenarios: tuple[Scene, ...] = ()
     over: RobustAim = WORST_PEAK
     orders: Orders | None = None
-    also: tuple[str, ...] = ()
     resources: Resources = HERE
     filters: tuple[Filter, ...] = ()
     paths: tuple[Resource, ...] = ()
@@ -348,8 +328,8 @@ class Problem(Shown):
     @property
     def is_timed(self) -> bool:
         """Whether the makespan is a goal or has a budget."""
-        capped = any(str(words).startswith("makespan=") for words in self.budgets)
-        return capped or any(goal.in_time for goal in self.goals)
+        capped = (cap.amount for cap in self.budgets)
+        return any(goal.in_time for goal in (*self.goals, *capped))
 
     @property
     def schedule(self) -> Schedule:
@@ -382,7 +362,7 @@ class Problem(Shown):
         )
 
     @cached_property
-    def graphs(self) -> dict[str, Any]:
+    def graphs(self) -> dict[tuple[Amount, ...], Any]:
         """Cached graphs of choices, with the responses that they computed."""
         return {}
 
@@ -419,49 +399,62 @@ def _over(given: RobustAim | str) -> RobustAim:
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
     "limits": as_limits,
-    # what is no budget is refused where they are read
-    "budgets": lambda given: (
-        tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
-    ),
+    "budgets": parse_budgets,
     "stands": lambda given: (
         given if isinstance(given, Standing | None) else Standing(find_mortar(given))
     ),
     "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
     "over": _over,
     "orders": lambda given: None if given is None else Orders.of(given),
-    "also": tuple,
 }
 
 
-def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
+def robot_responses(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
+    """Return the responses of single robots, where states say which of them holds."""
+    own = ("F_move", *(robot_response(robot.name) for robot in scene.robots))
+    return own if rules.names_robots() else ()
+
+
+def checked_limits(
+    limits: Sequence[Limit], network: Network, rules: FreeRules | Schedule
+) -> tuple[Limit, ...]:
     """Return the limits, checked to be on responses of a state."""
     limits = _step_limits(limits, network.scene)
     robots = {robot_response(robot.name) for robot in network.scene.robots}
+    known = {*STATE_RESPONSES, PROP_EXCESS, *robots, *robot_responses(rules, network.scene)}
     for limit in limits:
-        _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
+        _require(limit.response, known, "limit")
     return limits
 
 
-def check_parts(parts: Sequence[Amount | Filter]) -> None:
+def check_parts(
+    parts: Sequence[Amount | Filter], scene: Scene, rules: FreeRules | Schedule
+) -> None:
     """Raise a `ProblemError` if an amount or a filter asks for a response that no state has."""
+    known = {*STATE_RESPONSES, *robot_responses(rules, scene)}
     for part in parts:
         for name in part.responses:
-            _require(name, {*STATE_RESPONSES}, f"{type(part).__name__.lower()} {part}")
+            _require(name, known, f"{type(part).__name__.lower()} {part}")
 
 
-def of_states(engine: Engine, criterion: Criterion) -> Criterion:
-    """Return a criterion posed for a scene, if it is about states alone."""
-    if isinstance(criterion, RankSum):
+def of_states(engine: Engine, criterion: Criterion, rules: FreeRules | Schedule) -> Criterion:
+    """Return a criterion posed for a scene, if states have what it asks for."""
+    own = robot_responses(rules, engine.network.scene)
+    if isinstance(criterion, RankSum) and not own:
         raise ProblemError(
             f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
             "has none; take worst-ratio or weighted, or a schedule with open grips, as loop"
         )
-    for name in criterion.wanted(1):
-        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
-    return criterion.for_scene(SceneFacts(engine))
+    posed = criterion.for_scene(SceneFacts(engine))
+    for name in {n for bricks in (1, len(engine.network.inner)) for n in posed.wanted(bricks)}:
+        _require(name, {*STATE_RESPONSES, *own}, f"criterion {criterion.name}")
+    if not _counts_every_step(posed):
+        rules.names_robots(in_pairs=True)
+    return posed
 
 
 def _require(name: str, known: set[str], where: str) -> None:
     if name not in known and not is_tolerance(name):
         listed = ", ".join(sorted(known))
-        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")
+        hint = did_you_mean(name, known)
+        raise ProblemError(f"{where}: a state of the build has no {name}{hint}; give {listed}")

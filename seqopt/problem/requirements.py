@@ -12,16 +12,16 @@ from typing import Protocol
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Terse
+from seqopt.arrays import Bools, Floats
 from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses._tolerance import is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     EXCESS_COLUMN,
     NO_TOLERANCE,
+    OFFERED,
     PROP_EXCESS,
     RESPONSES,
     TOLERANCE,
@@ -33,6 +33,7 @@ from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_c
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule, carried, loads
 from seqopt.sequence.steps import AnyStep
 
@@ -54,6 +55,7 @@ what a joint gives way under it: 1 N, 1 N m and 1e-6 m on the arch of Bruun et a
 choices speak for such a rounding.
 """
 LARGEST = 1e100  # number: products of larger ones overflow
+CHOICE_RESPONSES = (*OFFERED, "F_move", "F_largest")  # of choices, and one per robot
 NAMES = (*CHOICE_RESPONSES, TOLERANCE)
 _LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 
@@ -346,20 +348,6 @@ def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
     return (Limit(PROP_EXCESS, _LITTLE * (weight / len(scene.bricks) or 1.0)),)
 
 
-@dataclass(frozen=True, repr=False)
-class ResponsesAsked(Terse):
-    """The responses that criterion, limits and ``also`` need."""
-
-    criterion: Criterion
-    limits: tuple[Limit, ...]
-    also: tuple[str, ...]
-
-    def __call__(self, bricks: int) -> frozenset[str]:
-        """Return their names for a move with so many bricks."""
-        limited = (limit.response for limit in self.limits)
-        return frozenset([*self.criterion.wanted(bricks), *limited, *self.also])
-
-
 def state_costs(
     criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
 ) -> Floats:
@@ -371,28 +359,22 @@ def state_costs(
     costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
     if (costs < 0).any():
         raise ProblemError(
-            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; in a "
-            "free schedule none may cost less than zero: add a constant"
+            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; none "
+            "may cost less than zero: add a constant"
         )
     return costs
 
 
-def robots_of(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
-    """Return the names of a schedule's robots; an error says if none of its grips is open."""
+def require_parts(engine: Engine, moves: Schedule | FreeRules, criterion: Criterion) -> None:
+    """Raise a `ProblemError` if a part of a problem is none."""
     wanted = (
         (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
-        (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
+        (moves, isinstance(moves, Schedule | FreeRules), "schedule", "three_robot_loop"),
         (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
     )
     for given, right, what, source in wanted:
         if not right:
             raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")
-    if not schedule.moves:
-        raise ProblemError(
-            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
-            "grip open; there is nothing to choose, analyze its steps"
-        )
-    return [robot.name for robot in schedule.scene.robots]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from seqopt.arrays import Terse
 from seqopt.contact.mortar import _mortar_name, _with_mortar
 from seqopt.engines.interface import OpeningEngine
-from seqopt.engines.registry import AutoEngine, recipe_of
+from seqopt.engines.registry import AutoEngine, recipe_of, simplest
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance
 from seqopt.responses.quantities import RESPONSES, _plain, length_text
@@ -46,12 +46,13 @@ class Enough(Terse):
     @property
     def lines(self) -> tuple[str, str]:
         """The sufficient model and its neglected effects, a line each."""
-        return f"enough: {self.engine}; {self.others}", f"left out: {'; '.join(self.left_out)}"
+        first = "taken" if "not known" in self.others else "enough"
+        return f"{first}: {self.engine}; {self.others}", f"left out: {'; '.join(self.left_out)}"
 
 
 def what_was_enough(within: LinearRange, builds: Mapping[str, _Columns]) -> Enough:
     """Return the sufficient model of builds by their tables; ``within``: their engine's range."""
-    engine, recipe = within.engine, recipe_of(within.engine)
+    engine = within.engine
     each = [(*within.closest(table), name) for name, table in builds.items()]
     below, joint, number, build = min(each, key=lambda one: np.nan_to_num(one[0], nan=np.inf))
     known = not np.isnan(below)
@@ -73,6 +74,7 @@ def what_was_enough(within: LinearRange, builds: Mapping[str, _Columns]) -> Enou
         others = "discrete elements were taken where joints open, elsewhere they change nothing"
     else:
         others = f"{unknown}{where} leaves its limits; the engine discrete says it"
+    recipe = recipe_of(simplest(engine) if below >= 0 else engine)
     name = type(engine).__name__ if recipe is None else recipe.name
     left_out = tuple(_left_out(within, builds))
     margin = below if known else None

@@ -1,4 +1,4 @@
-"""What a computation may use: processes or other machines, memory."""
+"""What a computation may use: processes or other machines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from seqopt.errors import ProblemError
-from seqopt.scene._checks import as_float
 from seqopt.work.progress import Tell
 
 
@@ -20,8 +19,6 @@ class Resources:
         Processes to share the work among; with an executor, how many tasks it works on at once.
     executor : concurrent.futures.Executor, optional
         Any executor, instead of processes of our own. The caller ends it.
-    max_memory : float, optional
-        Bytes that responses and costs may take; by default four fifths of the free memory.
     progress : callable, optional
         Called with the progress, in a few words, of computations longer than a second.
 
@@ -32,13 +29,12 @@ class Resources:
 
     Examples
     --------
-    >>> Resources(workers=2, max_memory=2e9).workers
+    >>> Resources(workers=2).workers
     2
     """
 
     workers: int = 1
     executor: Executor | None = None
-    max_memory: float | None = None
     progress: Tell | None = None
 
     def __post_init__(self) -> None:
@@ -49,9 +45,6 @@ class Resources:
                 f"executor: a {type(self.executor).__name__} is not an executor; "
                 "give one of concurrent.futures, or workers"
             )
-        most = self.max_memory
-        if not (most is None or (as_float(most) > 0)):  # NaN is not
-            raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:
         """Return resources for little work: one process, without progress."""
@@ -59,4 +52,4 @@ class Resources:
 
 
 HERE = Resources()
-"""This process alone, four fifths of the free memory."""
+"""This process alone."""

@@ -29,7 +29,7 @@ from seqopt.engines.interface import (
     select_sets,
 )
 from seqopt.engines.registry import AutoEngine, _chooser_of
-from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
     RESPONSES,
@@ -223,35 +223,17 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     engine : Engine
         The engine that computes them.
     steps : sequence of Step
-        Steps with every grip given.
+        Steps with every grip given; they need not follow each other.
 
     Returns
     -------
     pandas.DataFrame
-        One row per step. Forces are in N, moments in N m, displacements in 1e-3 mm, as the names of
-        the columns say. A cell is empty if the robot does not grip. If a scene has several ground
-        ends, ``F_sup`` and ``M_sup`` are the largest over them. Two further columns per end, such
-        as ``F_sup_25_N`` and ``M_sup_25_Nm`` for the end of brick 25, have its own values; they are
-        empty until the end acts.
+        As of `seqopt.analyze`.
 
     Raises
     ------
-    MechanismError, SolverError
-        As the engine raises them; the message says which step it is.
     SceneError, StepError
-        If an argument is not an engine, or not a list of steps.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> table = seqopt.analyze(engine, seqopt.sequential(network))
-    >>> numbers = table.select_dtypes("number").round(1)
-    >>> numbers.loc[46, ["step", "bricks", "M_sup_Nm", "D_max_1e-3mm"]].tolist()
-    [47.0, 24.0, 66.3, 305.9]
-    >>> numbers.loc[48, ["step", "M_sup_Nm", "M_sup_1_Nm", "M_sup_25_Nm"]].tolist()
-    [49.0, 6.5, 0.8, 6.5]
+        If an argument is not an engine, or not a list of steps; others as of `seqopt.analyze`.
     """
     return _table_of(_analyzed(engine, steps))
 
@@ -396,32 +378,6 @@ def step_named(step: Step) -> Iterator[None]:
         raise MechanismError(f"step {step.number}: {error}", error.mode) from error
     except SolverError as error:
         raise SolverError(f"step {step.number}: {error}") from error
-
-
-def _with_faults(
-    scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
-) -> pd.DataFrame:
-    """Return a table with added rows of steps that were not solved, and a column of reasons.
-
-    ``table``: of the others; ``faults``: errors by step number. The column ``finding`` is
-    ``mechanism``, with the brick that moves most, or ``not solved``, which leaves the step
-    undecided; the cells of their responses are empty.
-    """
-    rows: dict[int, dict[str, object]] = {}
-    for row in table.assign(finding="").to_dict("records"):
-        rows[row["step"]] = {str(name): cell for name, cell in row.items()}
-    for step in (step for step in steps if step.number in faults):
-        rows[step.number] = _held_cells(scene, step)
-        rows[step.number]["finding"] = "not solved"
-        if isinstance(fault := faults[step.number], MechanismError):
-            sizes = {brick: max(map(abs, motion)) for brick, motion in fault.mode}
-            most = f" (brick {max(sizes, key=sizes.__getitem__)})" if sizes else ""
-            rows[step.number]["finding"] = f"mechanism{most}"
-    names = dict.fromkeys(
-        ("step", "type", "bricks", "finding", *chain.from_iterable(rows.values()))
-    )
-    ordered = [rows[number] for number in sorted(rows)]
-    return _table_of({name: [row.get(name, np.nan) for row in ordered] for name in names})
 
 
 def _held_cells(scene: Scene, step: Step) -> dict[str, object]:

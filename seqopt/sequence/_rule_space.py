@@ -81,6 +81,41 @@ class Moves(NamedTuple):
     way: Floats  # (m,); how far the robot goes that takes a grip, m; zero where ways do not count
 
 
+class Candidates(NamedTuple):
+    """All choices of the grips that are open at a level, whether or not a build reaches them.
+
+    Attributes
+    ----------
+    columns : tuple of int
+        Columns of the robots whose grips are open, those that were taken first before others.
+    places : tuple of (C,) int
+        The places that each of them may hold.
+    states : (P, c) int
+        States of the possible choices: a place for each robot that no other one holds.
+    possible : (C,) or (C, D) bool
+        Which choices these are, in the same order.
+    """
+
+    columns: tuple[int, ...]
+    places: tuple[Ints, ...]
+    states: Ints
+    possible: Bools
+
+    def rows(self, states: Ints) -> tuple[Ints, ...]:
+        """Return where choices of states (n, c) stand in arrays of the shape of ``possible``."""
+        found = []
+        for column, places in zip(self.columns, self.places, strict=True):
+            order = np.argsort(places)
+            found.append(order[np.searchsorted(places, states[:, column], sorter=order)])
+        return tuple(found)
+
+    def spread(self, values: Floats) -> Floats:
+        """Return values (P,) of the possible choices in the shape of all; NaN of others."""
+        out = np.full(self.possible.shape, np.nan)
+        out[self.possible] = values
+        return out
+
+
 def sort_entries(states: Ints, first: int, end: int) -> None:
     """Sort the entries of a kind's robots, columns of (n, c), largest first, in place."""
     if end - first > 1:
@@ -153,6 +188,18 @@ class StateRows(Terse):
             out += states[:, column]
             out -= least
         return np.asarray(out)
+
+    def open_columns(self, level: int) -> tuple[int, ...]:
+        """Return the columns of robots whose grips are open at a level, in the order of moves."""
+        return ()
+
+    def candidates(self, level: int) -> Candidates:
+        """Return the choices of the grips that are open at a level."""
+        raise NotImplementedError
+
+    def decided_by(self, level: int) -> Any:
+        """Return the move that decides a level: the last of those that are open in it."""
+        raise NotImplementedError
 
     def held(self, states: Ints) -> Ints:
         """Return the nodes held (n, robots), ascending, zeros of free robots first."""

@@ -13,8 +13,8 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_space import Moves, RobotKind, StateRows
-from seqopt.sequence.schedule import OpenGrip, Schedule, can_carry, carried
+from seqopt.sequence._rule_space import Candidates, Moves, RobotKind, StateRows
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -95,9 +95,7 @@ class ScheduleSpace(StateRows):
         source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
         for (robot, _), places in zip(fresh, grids, strict=True):
             after[:, robot] = np.tile(places.ravel(), len(states))
-        held = self.held(after)
-        kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
-        kept &= self.for_arms(step.bricks, after) & (step.number not in self._too_heavy)
+        kept = self._possible(step, after) & (step.number not in self._too_heavy)
         source, after = source[kept], after[kept]
         way, came = np.zeros(len(source)), states[source]
         if self.parks:
@@ -105,6 +103,31 @@ class ScheduleSpace(StateRows):
             moved = self._at[np.abs(after)] - self._at[np.abs(came)]
             way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
+
+    def _possible(self, step: OpenStep, states: Ints) -> Bools:
+        """Return in which states (n, c) of a step every robot has a node of its own, (n,)."""
+        held = self.held(states)
+        each = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)
+        return np.asarray(each & self.for_arms(step.bricks, states))
+
+    def open_columns(self, level: int) -> tuple[int, ...]:
+        step = self.rules.steps[level - 1] if level else None
+        return () if step is None else tuple(step.grips.index(OpenGrip(m)) for m in step.moves)
+
+    def candidates(self, level: int) -> Candidates:
+        step, columns = self.rules.steps[level - 1], self.open_columns(level)
+        moves = [self.rules.moves[m] for m in step.moves]
+        places = tuple(np.array([self._place[n] for n in move.candidates]) for move in moves)
+        own = [0 if isinstance(grip, OpenGrip) else self._place.get(grip, 0) for grip in step.grips]
+        grid = np.meshgrid(*places, indexing="ij")
+        states: Ints = np.tile(np.array(own, dtype=np.int32), (grid[0].size, 1))
+        states[:, columns] = np.stack([each.ravel() for each in grid], axis=1)
+        possible = self._possible(step, states)
+        shaped = possible.reshape(grid[0].shape)
+        return Candidates(columns, places, states[possible], shaped)
+
+    def decided_by(self, level: int) -> Move:
+        return self.rules.moves[self.rules.steps[level - 1].moves[-1]]
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""

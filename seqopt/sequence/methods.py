@@ -121,8 +121,8 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
     raise StepError(
         f"robots {names}: not every role has a robot of its own: one places bricks {bricks}, all "
-        f"within reach of {fit or 'none'}; extend a reach, name other robots, or write a schedule "
-        "of your own"
+        f"within reach of {fit or 'none'}; take the free schedule (--schedule free), extend a "
+        "reach, name other robots, or write a schedule of your own"
     )
 
 

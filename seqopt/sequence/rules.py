@@ -6,15 +6,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
+from typing import ClassVar
 
 import numpy as np
 
 from seqopt.arrays import Bools, Ints
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import Near
+from seqopt.sequence.schedule import Move, Near
 from seqopt.sequence.steps import Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -267,11 +268,27 @@ class FreeRules:
         }
 
     method, has_pairs = FREE, False  # it is no list of steps with open grips
+    moves: ClassVar[tuple[Move, ...]] = ()
 
     @property
     def left_out(self) -> str:
         """How candidates are restricted, in words; empty if they are not."""
         return self.candidates
+
+    def names_robots(self, *, in_pairs: bool = False) -> bool:
+        """Return whether states say which robot holds: not of those that are alike."""
+        return False
+
+    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
+        """Return further columns of a table of steps: none."""
+        return {}
+
+    def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
+        """Raise a `ProblemError`: there are no moves to be chosen."""
+        raise ProblemError(
+            "the plan has no moves to show: it was chosen from states, which have no candidates; "
+            "take its steps"
+        )
 
     def letting_go(self, scene: Scene, steps: Sequence[Step]) -> int:
         """Return the number of last steps that release, with fewer grips than rules require."""

@@ -175,8 +175,30 @@ class Schedule(Shown):
             if step.moves and step.moves[-1] - step.moves[0] > 1:
                 raise StepError(
                     f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
-                    "for costs of moves at most two neighboring ones can be; give an aim"
+                    "to rank candidates at most two neighboring ones can be; take worst-ratio "
+                    "or weighted"
                 )
+
+    def names_robots(self, *, in_pairs: bool = False) -> bool:
+        """Return whether steps say which robot holds: they do; ``in_pairs``: `require_pairs`."""
+        if in_pairs:
+            self.require_pairs()
+        return True
+
+    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
+        """Return further columns of a table of steps: the robots whose grips were open."""
+        own = {s.number: ";".join(self.moves[m].robot for m in s.moves) for s in self.steps}
+        return {"optimized_robot": [own.get(step.number, np.nan) for step in steps]}
+
+    def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
+        """Return the node that every move takes in a sequence."""
+        grips = {step.number: step.grips for step in steps}
+        found = dict[int, int | None]()
+        for step in self.steps:
+            for grip, node in zip(step.grips, grips[step.number], strict=True):
+                if isinstance(grip, OpenGrip):
+                    found[grip.move] = node
+        return tuple(node for _, node in sorted(found.items()) if node is not None)
 
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules, for a summary: there are none."""

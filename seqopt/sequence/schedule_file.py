@@ -85,7 +85,9 @@ def _read_steps(
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     columns, rows = read_table(text, what, StepError)
     if lacking := [column for column in wanted if column not in columns]:
-        raise StepError(f"{what}: column {lacking[0]} is missing; give {', '.join(wanted)}")
+        scene_too = ", or the scene that it is for" if lacking[0].endswith("_node") else ""
+        give = ", ".join(wanted) + scene_too
+        raise StepError(f"{what}: column {lacking[0]} is missing; give {give}")
     if twice := [column for column in wanted if columns.count(column) > 1]:
         raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
     known = (*wanted, "prop_node")  # of a plan with props

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +15,8 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.decision_costs import ScenarioCosts
-from seqopt.graph.decisions import Decisions
 from seqopt.graph.formulation import Formulation, as_formulation
+from seqopt.graph.states._candidates import CandidateCosts
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import (
@@ -29,6 +28,7 @@ from seqopt.problem.amounts import (
     StateArrays,
     judged_by,
 )
+from seqopt.problem.criteria import _counts_every_step
 from seqopt.problem.filters import Filter, filters_of
 from seqopt.problem.problem import (
     WORST_PEAK,
@@ -39,8 +39,9 @@ from seqopt.problem.problem import (
     check_parts,
     checked_limits,
     of_states,
+    robot_responses,
 )
-from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.requirements import Criterion, Limit, state_costs
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
@@ -78,9 +79,9 @@ class States(Shown):
     largest. ``resources``: workers of grip sets, which the proof does
     not use; ``filters``: further requirements of states; ``orders``: which orders of the bricks are
     searched, by default the scene's own alone: values keep its scales; ``paths``: resources that
-    plans must keep; ``decisions``: of a schedule, what candidates of its moves cost, where these
-    are chosen: then there are no goals, and the formulation says whether the sum or the largest
-    counts.
+    plans must keep; ``answers``: responses of grip sets that were computed, by engine and names,
+    shared by all problems that are derived from one; ``judged``: what the judge computed again of
+    all choices of a level, which no formulation is given.
     """
 
     engine: Engine
@@ -98,7 +99,8 @@ class States(Shown):
     filters: tuple[Filter, ...] = ()
     orders: Orders | None = None
     paths: tuple[Resource, ...] = ()
-    decisions: Decisions | None = None
+    answers: dict[object, GripSets] = field(default_factory=dict, compare=False)
+    judged: dict[object, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -135,12 +137,6 @@ class States(Shown):
         """Itself: its engine is that of the nominal scene."""
         return self
 
-    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
-        """Return the names of goals, then of budgets; ``aim``: of decisions."""
-        if self.decisions is None:
-            return self.names
-        return (self.title or ("minmax" if aim is Aim.PEAK else "sum"),)
-
     def at(self, order: Order) -> States:
         """Return the problem of one order of the bricks, by name; itself where it is given: ()."""
         if not order:
@@ -174,20 +170,8 @@ class States(Shown):
 
     @property
     def title(self) -> str:
-        """What it is about, where plans stand beside each other; empty for their formulations."""
-        if self.decisions is None:
-            return f"{self.method} schedule"
-        return str(self.over) if self.scenarios else ""
-
-    @property
-    def candidates(self) -> tuple[tuple[int, ...], ...]:
-        """The nodes that can be chosen, move by move; none where states are chosen."""
-        return () if self.decisions is None else self.decisions.candidates
-
-    @cached_property
-    def costs_in_scenarios(self) -> tuple[ScenarioCosts, ...]:
-        """What candidates cost, scenario by scenario."""
-        return () if self.decisions is None else self.decisions.costs_in(self.scenarios)
+        """What it is about, where plans stand beside each other."""
+        return f"{self.method} schedule"
 
     @property
     def begin(self) -> Site | None:
@@ -201,28 +185,20 @@ class States(Shown):
             return ("order",)
         if self.is_timed or self.paths:
             return ("time",) * self.is_timed + ("resource",) * bool(self.paths)
-        if self.totals:
-            return ("tail",) if self.decisions is None else ("tail", "instance")
-        return ("goals",)
+        return ("tail",) if self.totals else ("goals",)
 
     @property
     def default_formulation(self) -> str:
         """The name of the formulation that chooses from it if none is named."""
-        if self.decisions is None:
-            others = dict.fromkeys(("time", "resource"), "makespan_labels")
-            return ({"order": "order_search"} | others).get(self.questions[0], "schedule_search")
-        if self.scenarios:
-            return "scenario_search" if self.totals else "minimax"
-        return "labels" if self.decisions.budgets else "overlap_dp"
+        others = dict.fromkeys(("time", "resource"), "makespan_labels")
+        return ({"order": "order_search"} | others).get(self.questions[0], "schedule_search")
 
     def formulation(self, named: Formulation | str | None) -> Formulation:
         """Return the formulation that chooses from it; a `ProblemError` if it does not fit."""
         return as_formulation(named or self.default_formulation, *self.questions)
 
-    def in_display_units(self, aim: Aim | None, values: Sequence[float]) -> dict[str, float]:
+    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names; of a tilt the critical one, degrees."""
-        if self.decisions is not None:
-            return dict(zip(self.names_of(aim), values, strict=False))
         found = zip(self.names, self.goals, values, strict=False)
         return {name: goal.shown(value) for name, goal, value in found}
 
@@ -230,31 +206,19 @@ class States(Shown):
         """Return the bounds of goals, without those of budgets."""
         return bounds[: max(1, len(self.aims))]
 
-    def chosen_nodes(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Return the node chosen for every move; a `ProblemError` where states were chosen."""
-        if self.decisions is None:
-            raise ProblemError("states were chosen, not candidates of moves; take its steps")
-        return tuple(state[-1] for state in states)
-
-    def chosen_candidates(self, states: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Return the candidate chosen for every move; a `ProblemError` where states were chosen."""
-        nodes = self.chosen_nodes(states)
-        pairs = zip(self.candidates, nodes, strict=True)
-        return tuple(candidates.index(node) for candidates, node in pairs)
-
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged exact search is optimal, up to the proven width of margins."""
-        beside = self.budgets or self.totals or self.is_timed or self.paths or self.decisions
+        beside = self.budgets or self.totals or self.is_timed or self.paths
         return exact and not beside
 
-    def described(self, aim: Aim | None, limits: Mapping[str, object]) -> dict[str, object]:
+    def described(self, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         stands = None
         if self.standing is not None:
             sets = {name: getattr(self.stability, name) for name in COUNTED}
             stands = {**self.standing.described(), **sets}
         return {
-            "aims": [*self.names_of(aim)][: max(1, len(self.aims))],
+            "aims": [*self.names][: max(1, len(self.aims))],
             **judged_by(self.goals or (SUM,), self.criterion),
             "scenarios": len(self.scenarios),
             "limits": limits,
@@ -268,28 +232,22 @@ class States(Shown):
         self, objective: Mapping[str, float], found: Solution
     ) -> dict[str, dict[str, float | None]]:
         """Return cap, use and multiplier, if one is known, of every budget."""
-        if self.decisions is None:
-            capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
-            return {n: {"bound": cap, "spent": objective[n], "price": None} for n, cap in capped}
-        caps, choice = self.decisions.caps, self.chosen_candidates(found.states)
-        known = [budget.name for budget in caps if np.isfinite(budget.bound)]
-        prices = dict(zip(known, found.prices[0] if found.prices else (), strict=False))
+        capped = zip(self.names[len(self.aims) :], self.budgets, strict=True)
+        prices = found.prices[0] if found.prices else (None,) * len(self.budgets)
         return {
-            budget.name: {
-                "bound": budget.bound if np.isfinite(budget.bound) else None,
-                "spent": budget.spent(choice),
-                "price": prices.get(budget.name),
-            }
-            for budget in caps
+            name: {"bound": cap, "spent": objective[name], "price": price}
+            for (name, cap), price in zip(capped, prices, strict=False)
         }
 
+    def chosen_nodes(
+        self, steps: Sequence[Step], states: Sequence[Sequence[int]]
+    ) -> tuple[int, ...]:
+        """Return the node chosen for every move; a `ProblemError` where rules have none."""
+        return self.rules.chosen(steps)
+
     def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of the table of responses: of decisions who was chosen for."""
-        if self.decisions is None:
-            return {}
-        own = self.decisions.schedule
-        robots = {s.number: ";".join(own.moves[m].robot for m in s.moves) for s in own.steps}
-        return {"optimized_robot": [robots.get(step.number, np.nan) for step in steps]}
+        """Return further columns of the table of responses: whose grips were open."""
+        return self.rules.step_columns(steps)
 
     def letting_go(self, steps: Sequence[Step]) -> int:
         """Return how many steps at the end only let go."""
@@ -334,39 +292,63 @@ class States(Shown):
         return out
 
     @cached_property
-    def named(self) -> tuple[str, ...]:
-        """The responses that goals, criterion and limits name."""
-        names = [name for goal in self.goals for name in goal.responses]
-        names += [name for each in self.filters for name in each.responses]
+    def asked(self) -> frozenset[str]:
+        """The responses that goals, criterion, filters and limits name."""
+        parts: tuple[Amount | Filter, ...] = (*self.goals, *self.filters)
+        names = {name for part in parts for name in part.responses}
         if any(goal.of_criterion for goal in self.goals):
-            names += self.criterion.wanted(1)
-        names += [limit.response for limit in self.limits]
-        return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS) if name in names)
+            for bricks in range(1, 1 + len(self.network.inner)):
+                names.update(self.criterion.wanted(bricks))
+        return frozenset(names.union(limit.response for limit in self.limits))
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """Those of a state, independent of which robot holds where."""
+        return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS) if name in self.asked)
+
+    @cached_property
+    def _of_each(self) -> frozenset[str]:
+        """Those that belong to single robots."""
+        return self.asked - {*self.named}
+
+    @property
+    def by_robot(self) -> bool:
+        """Whether costs of states depend on the other candidates, or on which robot holds where."""
+        of_robots = {*robot_responses(self.rules, self.network.scene)} & {*self.criterion.wanted(1)}
+        asked = bool(of_robots) or self.is_relative
+        return asked and any(goal.of_criterion for goal in self.goals)
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether only steps with an open grip have costs, such as ranks among candidates."""
+        return not _counts_every_step(self.criterion)
 
     @property
     def aims(self) -> tuple[Amount, ...]:
         """The goals that are minimized."""
         return self.goals[: len(self.goals) - len(self.budgets)]
 
-    @cached_property
+    @property
     def sets(self) -> GripSets:
         """Responses of grip sets, those of the engine that are named; the forces come with them."""
-        names = [name for name in self.named if name != LARGEST]
-        return GripSets(self.engine, names, self.resources)
+        return self._sets(screen=False)
 
-    @cached_property
+    @property
     def screened(self) -> GripSets:
         """Responses in single precision, to search by: enough where only worst values count."""
-        if self.filters or any(goal.states and not goal.has_few_digits for goal in self.goals):
-            return self.sets
-        return GripSets(self.engine, self.sets.names, self.resources, screen=True)
+        whole = any(goal.states and not goal.has_few_digits for goal in self.goals)
+        return self._sets(screen=not (self.filters or whole or self.is_relative))
+
+    def _sets(self, *, screen: bool) -> GripSets:
+        names = tuple(name for name in self.named if name != LARGEST)
+        key = id(self.engine), names, screen
+        if key not in self.answers:
+            self.answers[key] = GripSets(self.engine, names, self.resources, screen=screen)
+        return self.answers[key]
 
     @property
     def models(self) -> int:
         """How many grip sets were solved."""
-        if self.decisions is not None:
-            found = self.costs_in_scenarios or (self.decisions,)
-            return sum(costs.models for costs in found)
         if self.each:
             return sum(problem.models for problem in self.each)
         return self.sets.solved + self.six_digit_models
@@ -374,8 +356,6 @@ class States(Shown):
     @property
     def six_digit_models(self) -> int:
         """How many of them were solved in single precision: enough to search by."""
-        if self.decisions is not None:
-            return 0
         if self.each:
             return sum(problem.six_digit_models for problem in self.each)
         return self.screened.solved * (self.screened is not self.sets)
@@ -395,16 +375,8 @@ class States(Shown):
         ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether single precision
         is enough, except close to a limit. Stability is evaluated later.
         """
-        (held, most), bricks = self._grips(states), self.space.bricks_at(level)
-        answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
-        if rough and self.screened is not self.sets:
-            close = self._close(answers, forces, most)
-            if close.any():
-                answers[close], forces[close] = self.sets.answers(bricks, held[close])
-        fits = np.asarray(np.isfinite(np.column_stack([answers, forces])).all(axis=1))
-        found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
-        nodes = self._node_numbers[places]
-        seen = StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
+        seen = self.seen(level, states, rough=rough)
+        fits = seen.possible.copy()
         for each in self.every_filter:
             if each.passes and not each.expensive:  # a filter without a test is kept by all moves
                 fits &= each.proven(seen)
@@ -413,6 +385,56 @@ class States(Shown):
                 rows = np.flatnonzero(fits)
                 fits[rows] = each.proven(seen.only(rows))
         return seen, fits
+
+    def seen(self, level: int, states: Ints, *, rough: bool = False) -> StateArrays:
+        """Return states as amounts and filters see them, before any filter is asked."""
+        (held, most), bricks = self._grips(states), self.space.bricks_at(level)
+        answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
+        if rough and self.screened is not self.sets:
+            close = self._close(answers, forces, most)
+            if close.any():
+                answers[close], forces[close] = self.sets.answers(bricks, held[close])
+        fits = np.asarray(np.isfinite(np.column_stack([answers, forces])).all(axis=1))
+        found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
+        if self._of_each:
+            found |= self._of_robots(level, states, forces)
+        nodes = self._node_numbers[places]
+        return StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
+
+    def _of_robots(self, level: int, states: Ints, forces: Floats) -> dict[str, Floats]:
+        """Return the force of each robot (n,), and of the one whose move is the last; NaN of none.
+
+        ``forces`` (n, r): in the order of the places held.
+        """
+        held, own = self._columns(states), np.full(forces.shape, np.nan)
+        np.put_along_axis(own, np.argsort(held, axis=1, kind="stable"), forces, axis=1)
+        own[held == 0] = np.nan
+        robots = [robot for kind in self.space.kinds for robot in kind.robots]
+        names = [robot_response(self.network.scene.robots[robot].name) for robot in robots]
+        columns = self.space.open_columns(level)
+        moving = own[:, columns[-1]] if columns else np.full(len(states), np.nan)
+        return {**dict(zip(names, own.T, strict=True)), "F_move": moving}
+
+    def costs(self, level: int, seen: StateArrays) -> Floats:
+        """Return the criterion of states (n,).
+
+        Ranks are those among all candidates of the level, before limits and filters are asked.
+        """
+        if not self.is_relative:
+            return state_costs(self.criterion, seen.responses, seen.bricks, seen.possible)
+        return self.candidates.among(level, seen.rows)
+
+    @cached_property
+    def _by_candidates(self) -> bool:
+        """Whether costs of candidates are all that is asked of states."""
+        asked = self.limits or self.filters or not np.isinf(self._caps).all()
+        goals = all(goal.of_criterion for goal in self.goals)
+        return goals and self.is_relative and not asked
+
+    @cached_property
+    def candidates(self) -> CandidateCosts:
+        """Costs of states among the candidates of the grips that are open."""
+        return CandidateCosts(self)
 
     @cached_property
     def _node_numbers(self) -> Ints:
@@ -454,10 +476,15 @@ class States(Shown):
         out = np.zeros((len(states), len(self.goals)))
         if not bricks:  # the empty site, where a take-down ends
             return out, np.ones(len(states), dtype=bool)
+        if self._by_candidates:
+            out[:] = self.candidates.among(level, states)[:, None]
+            return out, np.asarray(np.isfinite(out).all(axis=1))
         found, within = self.responses(level, states, rough=rough)
         found = found._replace(possible=within)
         for column, goal in enumerate(self.goals):
-            if goal.states is not None:
+            if goal.of_criterion:
+                out[:, column] = np.where(within, self.costs(level, found), np.inf)
+            elif goal.states is not None:
                 out[:, column] = goal.value(found)
         within &= np.isfinite(out).all(axis=1)
         out[~within] = np.inf
@@ -518,7 +545,8 @@ class States(Shown):
     def joined(self, before: Floats, values: Floats, number: int) -> Floats:
         """Return values (n, g) over scenarios with those of one more, the scenario of a number."""
         if self.weights:
-            return before + self.weights[number] * values
+            weight = self.weights[number]  # what is infinite in any scenario stays so
+            return before + (weight * values if weight else np.where(values < np.inf, 0.0, np.inf))
         return np.maximum(before, values)
 
     @cached_property
@@ -566,10 +594,12 @@ class States(Shown):
 
     def _grips(self, states: Ints) -> tuple[Ints, Floats]:
         """Return the nodes held, ascending, and the largest force at each, (n, r)."""
+        return _ascending(self._columns(states), self._caps)
+
+    def _columns(self, states: Ints) -> Ints:
+        """Return the place of the grip of every column, (n, r), 0 for none."""
         held = states[:, : len(self._caps)].clip(min=0)
-        if self._beyond.any():
-            held = np.where(held > 0, held + self._beyond, 0)
-        return _ascending(held, self._caps)
+        return np.where(held > 0, held + self._beyond, 0) if self._beyond.any() else held
 
     def held_to_stand(self, states: Ints) -> tuple[Ints, Floats]:
         """Return nodes held, ascending, and payloads, (n, r), for stability: no kinds of grips."""
@@ -596,12 +626,6 @@ def _ascending(held: Ints, most: Floats) -> tuple[Ints, Floats]:
     return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
 
-def of_decisions(decisions: Decisions) -> States:
-    """Return the graph in which candidates of moves are chosen."""
-    asked = decisions.engine, decisions.schedule, decisions.criterion, (), decisions.limits
-    return States(*asked, resources=decisions.evaluation.resources, decisions=decisions)
-
-
 def build_states(
     engine: Engine,
     rules: FreeRules | Schedule,
@@ -625,18 +649,19 @@ def build_states(
     """
     named = _goals(goals, least=1)
     rules = rules.begun(engine.network.scene)
-    limits = checked_limits(limits, engine.network)
+    limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
-        criterion = of_states(engine, criterion)
+        criterion = of_states(engine, criterion, rules)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
     return _asked(States(engine, rules, criterion, named, limits, standing))
 
 
-def within(problem: States, caps: Mapping[str, float]) -> States:
+def within(problem: States, caps: Mapping[Amount | str, float]) -> States:
     """Return a problem whose plans keep totals over the build within caps.
 
-    ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
-    Raises `ProblemError` if something is no total, or a cap is no number from 0.
+    ``caps``: amounts or their names, as ``steps``, ``regrips``, ``travel`` (m) or
+    ``sum(RESPONSE)``, and how much each may be. Raises `ProblemError` if something is no total, or
+    a cap is no number from 0.
 
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
@@ -644,7 +669,7 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     >>> within(problem, {"regrips": 3})
     States('arch25', minmax, regrips <= 3, 0 limits)
     """
-    goals = [_goals(name)[0] for name in caps]
+    goals = [_goals(each if isinstance(each, str) else (each,))[0] for each in caps]
     for goal, cap in zip(goals, caps.values(), strict=True):
         if goal.is_peak or goal.of_criterion:
             raise ProblemError(
@@ -689,7 +714,7 @@ def _asked(problem: States) -> States:
     """Return the problem after checks of goals, stability and curing; raises `ProblemError`."""
     if problem.standing is not None or any(goal.margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
-    check_parts(problem.goals)
+    check_parts(problem.goals, problem.network.scene, problem.rules)
     for goal in problem.goals:
         if goal.check is not None:
             goal.check(problem)

@@ -1,0 +1,91 @@
+"""Responses of builds, some steps of which are mechanisms, or cannot be solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
+
+import numpy as np
+import pandas as pd
+
+from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.engines.diagnosis import Finding, diagnose
+from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
+from seqopt.engines.registry import AutoEngine, recipe_of
+from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
+from seqopt.responses.table import LinearRange, _held_cells, _table_of, response_table, step_fields
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+from seqopt.stability._steps import assess_steps
+from seqopt.stability.assessment import Verdict
+
+
+def analyze_each(
+    within: LinearRange, steps: Iterable[Step], faults: dict[int, SeqoptError]
+) -> pd.DataFrame:
+    """Return the responses of the steps that an engine solves; errors of others go to ``faults``.
+
+    These are by step number: a step that falls is a mechanism, also where a solver fails.
+    """
+    return response_table(within.engine.network, _solved(within, steps, faults))
+
+
+def _solved(
+    within: LinearRange, steps: Iterable[Step], faults: dict[int, SeqoptError]
+) -> Iterator[tuple[Step, Fields]]:
+    """Yield solved steps with fields; errors of the others go to ``faults``, by step number."""
+    for step in steps:
+        try:
+            yield step, within.seen(step, step_fields(within.engine, step, Want.ALL))
+        except (MechanismError, SolverError) as error:
+            faults[step.number] = _fault(within.engine, step, error)
+
+
+def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
+    """Return the error of a step: of a step that falls a mechanism, not a solver's failure."""
+    if isinstance(error, MechanismError):
+        return error
+    recipe = recipe_of(engine)
+    if isinstance(engine, AutoEngine | OpeningEngine):
+        mortar = EPOXY if recipe is None else recipe.options.get("mortar", EPOXY)
+        assert isinstance(mortar, Mortar)  # as `make_engine` keeps it
+        with suppress(SceneError):  # faces that are not known prove nothing
+            (found,) = assess_steps(engine.network, [step], mortar)
+            if found.verdict is Verdict.FALLS:
+                why = "a motion proves that it falls, robots within payload"
+                mode = zip(engine.network.scene.build_order, map(tuple, found.motion), strict=False)
+                said = f"step {step.number}: {why}; add a grip, a bond or friction"
+                return MechanismError(said, (*mode,))
+        return error
+    numbers = engine.network.scene.grip_numbers(step.grips, step.bricks)
+    told = diagnose(engine.network, step.bricks, numbers)
+    if told.finding is Finding.MECHANISM:
+        return MechanismError(f"step {step.number}: {told.reason}; add a grip or a joint")
+    return error
+
+
+def _with_faults(
+    scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
+) -> pd.DataFrame:
+    """Return a table with added rows of steps that were not solved, and a column of reasons.
+
+    ``table``: of the others; ``faults``: errors by step number. The column ``finding`` is
+    ``mechanism``, with the brick that moves most, or ``not solved``, which leaves the step
+    undecided; the cells of their responses are empty.
+    """
+    rows: dict[int, dict[str, object]] = {}
+    for row in table.assign(finding="").to_dict("records"):
+        rows[row["step"]] = {str(name): cell for name, cell in row.items()}
+    for step in (step for step in steps if step.number in faults):
+        rows[step.number] = _held_cells(scene, step)
+        rows[step.number]["finding"] = "not solved"
+        if isinstance(fault := faults[step.number], MechanismError):
+            sizes = {brick: max(map(abs, motion)) for brick, motion in fault.mode}
+            most = f" (brick {max(sizes, key=sizes.__getitem__)})" if sizes else ""
+            rows[step.number]["finding"] = f"mechanism{most}"
+    names = dict.fromkeys(
+        ("step", "type", "bricks", "finding", *chain.from_iterable(rows.values()))
+    )
+    ordered = [rows[number] for number in sorted(rows)]
+    return _table_of({name: [row.get(name, np.nan) for row in ordered] for name in names})

@@ -1,0 +1,181 @@
+"""The part of a build that is asked: between which states, after which changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from seqopt._files import read_text
+from seqopt.errors import FileError, StepError
+from seqopt.scene.scene import Scene, in_order
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.rules import with_robots
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_file import read_plan, without
+from seqopt.sequence.steps import Site, Step
+
+FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
+
+
+def plan_folder(scene: object) -> Path | None:
+    """Return the folder of a plan that stands for its scene; None of another scene."""
+    if not isinstance(scene, str | Path) or not (path := Path(scene)).is_dir():
+        return None
+    for name in ("scene.json", "plan.csv"):
+        if not (path / name).is_file():
+            raise FileError(f"{path}: it has no {name}; give a folder of seqopt optimize --out")
+    return path
+
+
+def find_scene(
+    scene: Scene | Path | str,
+    *,
+    order: str | Sequence[int] | None = None,
+    grips: str | None = None,
+    props: str | None = None,
+    payload: Sequence[float | str] = (),
+    durations: Sequence[str] = (),
+    robots: int | Sequence[str] | None = None,
+) -> Scene:
+    """Return a scene by its name, words, file or a plan's folder, with what is other than it says.
+
+    Parameters
+    ----------
+    scene : Scene, str or pathlib.Path
+        A built-in scene, a JSON file, a plan's folder, or words as arch:span=2,rise=0.8 (default:
+        arch25); seqopt scene --list shows all.
+    order : str or sequence of int, optional
+        In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
+        ends at once), or the names of all bricks, as 1..12,25..13.
+    grips : str, optional
+        How stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
+        three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
+        turning.
+    props : str, optional
+        Nodes that props hold beside the robots, if not as the scene says, until the finished
+        structure is let go: as 13,27, or every, one at each brick as centering has; N/m after a
+        colon if they are not rigid, as every:1e6; then push for such as only push up, and
+        capacity=N.
+    payload : sequence of float or str, optional
+        What every robot may carry, N, if not as the scene says; of one robot with its name before,
+        as rob1=250.
+    durations : sequence of str, optional
+        How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
+        of ways between grips); that is to bring the next brick, to place it, to come to one that
+        stands, to grip it, to let go; who is free fetches and approaches while others act; of one
+        robot with its name before, as rob3:fetch=75 (default: as the scene says).
+    robots : int or sequence of str, optional
+        How many there are: those of the scene first, further ones reach every node.
+    """
+    if not isinstance(scene, Scene):
+        folder = plan_folder(scene)
+        scene = load_scene(scene if folder is None else folder / "scene.json")
+    scene = in_order(scene, order)
+    scene = scene.with_payloads(*payload) if payload else scene
+    scene = with_robots(scene, robots) if isinstance(robots, int) else scene
+    scene = scene if props is None else scene.with_props(props)
+    scene = scene if grips is None else scene.with_grips(grips)
+    return scene.with_durations(*durations) if durations else scene
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Place:
+    """Where a build begins or ends, and the steps that led there, if known."""
+
+    site: Site | None = None
+    done: tuple[Step, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """Which steps a build may have, between which states, after which changes.
+
+    Parameters
+    ----------
+    schedule : Schedule, pathlib.Path or str, optional
+        free: any robot may release, hold or place next, or a sequence with open grips, by name (of
+        all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
+        three robots, or of two where there is no third).
+    begin : Site, int or str, optional
+        Where the build begins: after a step of a plan (its folder or CSV file, of one step too);
+        or with so many bricks that nobody holds.
+    to : Site, int or str, optional
+        Where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
+        leaves grips to the rule ending.
+    direction : str, optional
+        Of a free schedule: take-down removes bricks, the newest first, from the whole structure to
+        the empty site, if nothing else is said.
+    lost : sequence of str, optional
+        Robot that lets go where the build begins, and takes no further part.
+    missing : sequence of int, optional
+        Brick that is not there: one that stood is placed again next, one that was still to come
+        waits until all are placed that do not hang on it.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.optimize("chain:bricks=7", Part(schedule="free", to=4)).steps[-1].bricks
+    4
+    """
+
+    schedule: Schedule | Path | str | None = None
+    begin: Site | _Place | int | str | None = None
+    to: Site | _Place | int | str | None = None
+    direction: str | None = None
+    lost: Sequence[str] = ()
+    missing: Sequence[int | str] = ()
+
+    def find_begin(self, scene: Scene) -> _Place:
+        """Return where it begins; changes need a build that goes on."""
+        begin = _find_place(self.begin, "begin", scene)
+        if wrong := [name for name in self.missing if not str(name).isdecimal()]:
+            raise StepError(f"missing {wrong[0]}: give the number of a brick")
+        changes = (*(("lost", n) for n in self.lost), *(("missing", n) for n in self.missing))
+        if changes and begin.site is None:
+            said = "a build that goes on has changed; say where it begins"
+            raise StepError("{} {}: {}".format(*changes[0], said))
+        return begin
+
+    def change(self, scene: Scene, site: Site | None) -> tuple[Scene, Site | None]:
+        """Return scene and beginning without what is lost or missing."""
+        if site is None or not (self.lost or self.missing):
+            return scene, site
+        return without(scene, site, self.lost, [*map(int, self.missing)])
+
+    def find_end(self, scene: Scene) -> Site | None:
+        """Return where it ends, None if with the finished structure."""
+        return _find_place(self.to, "to", scene).site
+
+
+def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
+    """Return where a build begins or ends."""
+    text = str(given)
+    try:
+        if given is None or isinstance(given, Site | _Place):
+            return _Place(given) if isinstance(given, Site) else given or _Place()
+        if text.isdecimal():
+            site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
+            site.holds(scene)
+            return _Place(site)
+        file, _, step = text.rpartition(":")
+        if file and step.isdecimal():
+            return _of_plan(scene, Path(file), int(step))
+        raise StepError(f"give {FORMS}")
+    except StepError as error:
+        raise StepError(f"{name} {text}: {error}") from None
+
+
+def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
+    """Return the place of a plan after a step; robots that it does not list hold nothing."""
+    file = path / "plan.csv" if path.is_dir() else path
+    columns = read_text(file).partition("\n")[0].split(",")
+    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
+    steps = read_plan(scene.with_robots(*known) if known else scene, file)
+    where = [known.index(robot) if robot in known else None for robot in scene.robots]
+    if known != [*scene.robots]:
+        steps = tuple(
+            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
+        )
+    done = tuple(each for each in steps if each.number <= step)
+    return _Place(Site.after(steps, step), done if steps[0].number == 1 else ())
