@@ -9,6 +9,7 @@ were taken since the last brick, where that counts.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,28 @@ class Transitions(NamedTuple):
     states: Ints
     regrip: bool
     distance: Floats
+
+
+class Choices(NamedTuple):
+    """All choices of the grips that are open in a step: by whom, and how many of each.
+
+    ``states`` (n, c): of the possible ones; ``possible``: which these are of all, in the shape of
+    ``sizes``; ``moves``: robots that choose, in the order of their moves; ``decided_at``: bricks
+    that stand at the last of these.
+    """
+
+    bricks: int
+    states: Ints
+    possible: Bools
+    moves: tuple[int, ...]
+    sizes: tuple[int, ...]
+    decided_at: int
+
+    def spread(self, values: Floats) -> Floats:
+        """Return values (n,) in the shape of all choices; NaN of those that are impossible."""
+        out = np.full(self.possible.shape, np.nan)
+        out[self.possible] = np.where(np.isfinite(values), values, np.nan)
+        return out
 
 
 class _Tables:
@@ -125,6 +148,10 @@ class _Tables:
 
 class RuleTables(_Tables):
     """A book of rules for many states at once; a level is a brick count."""
+
+    def choices(self, level: int) -> Choices:
+        """Raise an error: rules leave no grips of given steps open."""
+        raise NotImplementedError
 
     def __init__(
         self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
@@ -377,6 +404,26 @@ class ScheduleTables(_Tables):
         """Return the places that a hold may take."""
         nodes = (hold.node,) if hold.move is None else self._schedule.moves[hold.move].candidates
         return [self._place[node] for node in nodes if node is not None]
+
+    def choices(self, level: int) -> Choices:
+        """Return what may be chosen in a step, whether or not a build reaches it."""
+        bricks, held = self.bricks_at(level), range(self.robots)
+        own = {r: h for r in held if (h := self._holds.get((r, level))) is not None}
+        wanted = {robot: self._wanted(hold) for robot, hold in own.items()}
+        by_move = sorted((h.move, r) for r, h in own.items() if h.move is not None)
+        robots = tuple(robot for _, robot in by_move)
+        sizes = tuple(len(wanted[robot]) for robot in robots)
+        places = np.indices(sizes).reshape(len(sizes), prod(sizes))
+        states = np.zeros((places.shape[1], self.robots), dtype=self.start().dtype)
+        for robot, of_robot in wanted.items():
+            states[:, robot] = of_robot[0]
+        for robot, at in zip(robots, places, strict=True):
+            states[:, robot] = np.array(wanted[robot])[at]
+        ok = (np.diff(np.sort(states[:, [*own]], axis=1), axis=1) > 0).all(axis=1)
+        ok &= self._postures.allow(bricks, states)
+        last = by_move[-1][0] if by_move else None
+        decided = 0 if last is None else self._schedule.moves[last].bricks
+        return Choices(bricks, states[ok], ok.reshape(sizes), robots, sizes, decided)
 
     def certain(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the places held (1, robots) of steps in which no hold is chosen."""

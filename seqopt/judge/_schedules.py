@@ -19,9 +19,10 @@ from seqopt.errors import SolverError, StepError
 from seqopt.graph._orders import order_rules
 from seqopt.graph.formulation import Solution
 from seqopt.graph.states.states import States
+from seqopt.judge._candidates import depends_on_robots, values_by_level
 from seqopt.judge._proof import BELOW, Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge._states import largest_load
+from seqopt.judge._states import StateEvaluator, largest_load
 from seqopt.judge._step_checks import check_props, check_shape, proven_margins
 from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.judge.certificate import TOLERANCE, Basis, Certificate
@@ -67,10 +68,12 @@ def judge_schedule(
     if problem.is_timed:
         twin = next((goal.twin for goal in problem.goals if goal.in_time), None)
         proves = twin is not None and bool(np.isfinite(selection.bound).any())
-    is_claimed = not proves and (selection.stopped or by_labels)
+    early = bool(selection.stopped) and not _is_quick(problem, selection)
+    is_claimed = not proves and (early or by_labels)
     bounds: Bounds = (-np.inf,) * len(problem.goals)  # they are claimed alone
     with suppress(TooManyPartsError):
         if not is_claimed and _has_twins(problem):
+            exact &= not selection.stopped
             return _proven(problem, selection, values, hint, exact=exact)
         first, least = replace(problem, budgets=(), goals=problem.goals[:1]), selection.bound[0]
         is_sought = selection.stopped not in ENDED and not by_labels and _has_twins(first)
@@ -81,6 +84,12 @@ def judge_schedule(
     gap = _gap(problem.aims, values, bounds)
     left = gap if is_claimed else _gap(problem.aims, values, _closed(values, selection.bound))
     return Certificate(values, bounds, gap, left, basis=Basis.REBUILT)
+
+
+def _is_quick(problem: States, selection: Solution) -> bool:
+    """Return whether a bound is proven soon, of a search that stopped early too: as of loops."""
+    priced = bool(selection.prices) or not (problem.budgets or problem.totals)
+    return problem.rules.has_pairs and priced and not problem.demands
 
 
 def ordered(problem: States, order: Order) -> States:
@@ -229,13 +238,19 @@ def plan_values(
     if fault is not None:
         number = steps[fault[1]].number
         raise SolverError(f"the resource {fault[0]} is not kept up to step {number}")
-    margins = proven_margins(problem, steps, claimed)
+    margins, by_level = proven_margins(problem, steps, claimed), np.zeros((0, 0))
+    if elsewhere := depends_on_robots(problem):
+        evaluator = StateEvaluator(problem)
+        by_level = values_by_level(evaluator, [evaluator.tables.row(s.grips) for s in steps])
     for k, goal in enumerate(problem.goals):
         if goal.margins is not None:
             out.append(margins[goal.name])
         elif goal.in_time:
             known = goal.twin is not None
             out.append(goal.twin.value(problem, steps, starts) if known else claimed[k])
+        elif k in elsewhere:
+            own = by_level[:, k]
+            out.append(float(own.max(initial=0.0) if goal.is_peak else own.sum()))
         else:
             out.append(_value(goal, levels, moves))
     return tuple(out)

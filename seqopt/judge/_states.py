@@ -13,6 +13,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import strictly_below, tied
 from seqopt.graph.states.states import States
+from seqopt.judge._candidates import LevelTables, depends_on_robots
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values, twin_of
@@ -80,7 +81,11 @@ def _ask_engine(problem: States, bricks: int, grips: Ints) -> Answers:
         if len(left):
             fit[left] = ~each.refuted_again(seen.only(left))
     seen = seen._replace(possible=fit)
-    own = [own_values(goal) if goal.states is not None else None for goal in problem.goals]
+    elsewhere = depends_on_robots(problem)  # values of these are written by `LevelTables`
+    own = [
+        own_values(goal) if goal.states is not None and k not in elsewhere else None
+        for k, goal in enumerate(problem.goals)
+    ]
     zeros = np.zeros(len(grips))  # of what is not about states
     values = np.column_stack([zeros if value is None else value(seen) for value in own])
     return Answers(values, forces, fit & np.isfinite(values).all(axis=1), len(grips))
@@ -137,15 +142,21 @@ class StateEvaluator:
             self.tables = RuleTables(book, groups, parks=problem.parks)
         team, nodes, kinds = list(self.tables.team), self.tables.nodes, scene.grip_kinds
         self.margins = sum(goal.margins is not None for goal in problem.goals)
-        self._most, self._loads = np.array(most)[team], np.array(own)
+        self.most, self._loads = np.array(most)[team], np.array(own)
         self._payload = self._loads[team]
         more = [kind * kinds.span for kind in range(len(kinds.turns))]
-        self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
+        self.numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[team]
         self._standing = dict[Standing, tuple[StandingSets, ...]]()
         twins = (twin_of(goal) for goal in problem.goals if not goal.is_peak)
         self._to_go = next((twin.to_go for twin in twins if twin and twin.to_go), None)
-        self.models = 0  # how often the engine was asked of a grip set, in any scenario
+        self._levels = LevelTables(self)
+        self._models = 0
+
+    @property
+    def models(self) -> int:
+        """How often the engine was asked of a grip set, in any scenario."""
+        return self._models + self._levels.models
 
     def least(self) -> tuple[float, ...]:
         """Return lower bounds of goals, from the one end that builds have and from counted steps.
@@ -217,12 +228,22 @@ class StateEvaluator:
         below = np.inf
         if len(asked.values) > k and goals[k].is_peak:
             below = (strictly_below if asked.strict else tied)(asked.values[k])
-        held, payload = self._held(states, self._most, self._beyond)
-        values, forces, ok = self._answers(bricks, held, np.inf if k else below)
-        ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
+        values, ok = np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
+        if not self._levels.is_enough:
+            held, payload = self._held(states, self.most, self._beyond)
+            values, forces, ok = self._answers(bricks, held, np.inf if k else below)
+            ok &= (forces <= payload).all(axis=1)
+        self._levels.fill(level, states, values, ok)
+        ok &= np.isfinite(values).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
         if asked.margins is not None:
             ok[ok] = self.may_stand(level, states[ok], asked.margins)
         return values, ok
+
+    def grips(self, states: Ints) -> tuple[list[int], Ints]:
+        """Return which robots hold in states of one step, and the numbers of their grips (n, r)."""
+        columns = np.flatnonzero((states[:, : self.tables.robots] > 0).any(axis=0))
+        beyond = np.broadcast_to(self._beyond, self.most.shape)[columns]
+        return [self.tables.team[c] for c in columns], self.numbers[states[:, columns] + beyond]
 
     def demands(self, margins: Sequence[float]) -> tuple[Standing, ...]:
         """Return the stability requirements of states, with values of the first goals, margins."""
@@ -269,12 +290,12 @@ class StateEvaluator:
         for grips in np.unique(count).tolist():
             rows = np.flatnonzero(count == grips)
             places = held[rows, held.shape[1] - grips :]
-            codes = places @ len(self._numbers) ** np.arange(grips)
+            codes = places @ len(self.numbers) ** np.arange(grips)
             _, first, again = np.unique(codes, return_index=True, return_inverse=True)
-            found = ask(self.problem, bricks, self._numbers[places[first]], below)
+            found = ask(self.problem, bricks, self.numbers[places[first]], below)
             values[rows], fit[rows] = found.values[again], found.fit[again]
             forces[rows, held.shape[1] - grips :] = found.forces[again]
-            self.models += found.models
+            self._models += found.models
         return values, forces, fit
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:

@@ -300,25 +300,55 @@ def budget_bounds(
     """Return Lagrangian lower bounds of paths under caps on the last columns, goal by goal.
 
     ``values``, ``claimed``: of a path, and the bounds that are claimed for worst amounts;
-    ``priced``: the caps; by goal, multipliers of these and of the sums before it.
+    ``priced``: the caps; by goal, multipliers of these and of the sums before it; of a goal without
+    any the judge finds its own.
     """
     caps, multipliers = priced
     first, out = len(graph.peaks) - len(caps), list[float]()
     stage = Stage(graph, tuple(("", c, cap) for c, cap in enumerate(caps, start=first)))
     for k in range(first):
-        own = [max(price, 0.0) for price in (multipliers[k] if k < len(multipliers) else ())]
+        given = multipliers[k] if k < len(multipliers) else (0.0,) * len(stage.limited)
+        own = [max(price, 0.0) for price in given]
         if len(own) != len(stage.limited) or not np.isfinite(own).all():
             counts = f"{len(own)} where {len(stage.limited)} numbers belong"
             raise SolverError(f"there is no multiplier for every budget and goal: {counts}")
         limited = [(price, c, most) for price, (_, c, most) in zip(own, stage.limited, strict=True)]
         goal = _Target("", PEAK if graph.peaks[k] else SUM, (k,))
         if graph.peaks[k]:
-            out.append(_peak(stage, goal, claimed[k], limited))
+            is_alone = k >= len(multipliers)
+            out.append((_own_peak if is_alone else _peak)(stage, goal, claimed[k], limited))
             stage = next_stage(stage, goal, values[k])
         else:  # what is tied with a value would loosen the bounds of later goals
-            out.append(_sum(stage, stage.graph.amounts[:, k], limited))
+            costs = stage.graph.amounts[:, k]
+            bound = _sum(stage, costs, limited)
+            if claimed[k] > bound + ABOVE * abs(claimed[k]):  # labels may close what is left open
+                some = [(c, most) for _, c, most in limited]
+                bound = max(bound, _laid_down(stage.graph, costs, some, values[k], own))
+            out.append(bound)
             stage = stage._replace(limited=(*stage.limited, ("", k, values[k])))
     return tuple(out)
+
+
+def _laid_down(
+    graph: Graph,
+    costs: Floats,
+    limited: Sequence[tuple[int, float]],
+    value: float,
+    multipliers: Sequence[float],
+) -> float:
+    """Return the lower bound of a sum within caps that labels prove, from multipliers on."""
+    limited = [(column, tied(most)) for column, most in limited]
+    return least_within(graph, costs, limited, value, prices=multipliers, laid_down=True)[0]
+
+
+def _own_peak(
+    stage: Stage, goal: _Target, claimed: float, limited: Sequence[tuple[float, int, float]]
+) -> float:
+    """Return the bound of a peak by multipliers and labels of the judge: as claimed, or lower."""
+    part, caps = only_below(stage.graph, goal, claimed), [(c, tied(most)) for _, c, most in limited]
+    if least_within(part, np.zeros(len(part.source)), caps, 1.0, laid_down=True)[0] >= 1.0:
+        return claimed
+    return _peak(stage, goal, None, ())
 
 
 def _peak(
