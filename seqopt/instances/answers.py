@@ -127,7 +127,7 @@ def _numbers(where: str, given: Any, *, whole: bool = False, rows: bool = False)
         found = np.array("")
     flat = found.ndim == 1 or (rows and found.ndim == 2)
     if found.size and (not flat or found.dtype.kind not in "iuf" or np.isnan(found).any()):
-        raise ProblemError(f"{where}: give a list of numbers; NaN and text are none")
+        raise ProblemError(f"{where} is {short(given)}: give numbers; NaN and text are none")
     if whole:
         if not len(found) or not (np.abs(found) < 2.0**63).all() or (found % 1).any():
             raise ProblemError(f"{where}: give a list of whole numbers")

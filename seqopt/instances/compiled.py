@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from seqopt._registry import offered
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph._explore import Explorer
-from seqopt.graph.decision_costs import on_paths
-from seqopt.graph.formulation import as_formulation
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.graph import Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
+from seqopt.graph.paths import _on_paths, contracted
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
 from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import without_shares
 from seqopt.problem.problem import Aim, Problem
 
 
@@ -67,21 +68,8 @@ def compile_instance(
     <Instance 'chain 7': 1613 nodes, 6405 arcs, minmax, steps>
     """
     name = name or problem.engine.network.scene.name
-    graph = graph_of(problem)
-    if graph.decisions is None:
-        instance = _of_states(name, graph, below)
-    elif below < np.inf:
-        raise ProblemError("below: it is about states; name aims, or leave it out")
-    else:  # a level for every move
-        graph.decisions.require_possible(graph.worlds)
-        asked = aim or as_formulation(graph.default_formulation).aim
-        worlds: Any = {"each": graph.costs_in_scenarios, "over": graph.over}
-        found = graph.decisions.compiled(asked, name, alone=True, **worlds)
-        if found.offset:
-            raise ProblemError(
-                f"instance {name}: a cost is below zero; ask for a criterion that is never negative"
-            )
-        instance = found.instance
+    problem = without_shares(problem)
+    instance = _of_states(name, graph_of(problem, aim), below)
     return replace(instance, facts={"seqopt": version("seqopt"), **(facts or {})})
 
 
@@ -108,6 +96,8 @@ def _of_states(name: str, states: States, below: float) -> Instance:
     rows = np.concatenate([space.rows(key, own) for _, key, own in visited.states])
     timed = None
     whole = visited.graph
+    if states.rules.names_robots() and not states.is_timed:
+        return _of_decisions(name, states, visited, rows, asked)
     if states.is_timed:
         if states.standing is not None and states.standing.curing is not None:
             raise ProblemError("instance: how mortar cures is not in it; leave curing out")
@@ -115,7 +105,7 @@ def _of_states(name: str, states: States, below: float) -> Instance:
         every = [k for k, goal in enumerate(states.goals) if not goal.in_time]
         peaks = tuple(whole.peaks[k] for k in every)
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
-    small, kept = on_paths(whole)
+    small, kept = _pruned(whole)
     names, goals, caps = asked
     if timed is not None:  # of the nodes that are kept
         on = np.isin(np.arange(whole.states), kept)
@@ -130,6 +120,30 @@ def _of_states(name: str, states: States, below: float) -> Instance:
         )
     arrays = small.source, small.target, small.ends
     return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
+
+
+def _pruned(graph: Graph) -> tuple[Graph, Ints]:
+    """Return the subgraph of states and moves on paths to ends, and which states these are."""
+    small = graph.only(_on_paths(graph))
+    if not len(small.source):
+        raise InfeasibleError("no path leads to an end")
+    on = np.isin(np.arange(graph.states), [small.source, small.target])
+    number = (np.cumsum(on) - 1).astype(np.int32)
+    rows = number[small.source], number[small.target]
+    return replace(small, source=rows[0], target=rows[1], ends=graph.ends[on]), np.flatnonzero(on)
+
+
+def _of_decisions(name: str, states: States, visited: Visited, rows: Ints, asked: Any) -> Instance:
+    """Return the instance whose arcs are decisions, with the forced steps behind them."""
+    graph, (names, goals, caps) = visited.graph, asked
+    if not states.totals and states.goals[0].of_criterion:
+        own = [states.candidates.charges(level, each) for level, _, each in visited.states]
+        graph = replace(graph, alone=np.concatenate(own)[graph.target])
+    short = contracted(graph.only(_on_paths(graph)))
+    rows, small = rows[short.kept], short.graph
+    rows[:, 0] = np.unique(rows[:, 0], return_inverse=True)[1]  # levels of decisions
+    arrays = small.source, small.target, small.ends, tuple(names), small.amounts
+    return Instance(name, *arrays, goals, caps, rows, alone=small.alone)
 
 
 def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:

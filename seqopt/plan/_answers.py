@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -29,44 +29,26 @@ from seqopt.errors import (
     TimeUpError,
     message_of,
 )
-from seqopt.graph.decision_costs import Budget
-from seqopt.graph.formulation import (
-    Finding,
-    Formulation,
-    FormulationKind,
-    Run,
-    Solution,
-    Watch,
-    formulations,
-    timed,
-)
+from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch, timed
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.problem.problem import AskedBudget
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import INTERRUPT
-
-if TYPE_CHECKING:
-    from seqopt.graph.decisions import Windows
 
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 Result = TypeVar("Result")
 
 
 class Found(NamedTuple):
-    """What was chosen: claimed solution, certificate, checked steps, run times by stage, s.
-
-    ``search``: as of `Plan`.
-    """
+    """What was chosen: claimed solution, certificate, checked steps, run times by stage, s."""
 
     selection: Solution
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: dict[str, float]
-    search: Windows | None = None
 
 
 def called(name: str, kind: type[Result], solve: Callable[[], object]) -> Result:
@@ -159,19 +141,6 @@ def _wholes(given: object) -> Ints:
     return out.astype(np.int64)
 
 
-def require_fit(
-    budgets: Sequence[Budget | AskedBudget], formulation: Formulation, options: Mapping[str, object]
-) -> None:
-    """Raise a `ProblemError` unless a formulation supports the budgets and options given."""
-    if budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations("costs").items() if other.takes_budgets]
-        raise ProblemError(
-            f"{formulation.name}: the budget {budgets[0].name!r} couples all moves; "
-            f"use {' or '.join(able)}"
-        )
-    formulation.require_options(options)
-
-
 def require_time(formulation: Formulation, time_limit: float) -> None:
     """Raise a `ProblemError` unless a time limit is a number from 0, s, and is supported."""
     if not isinstance(time_limit, Real) or not time_limit >= 0:
@@ -191,43 +160,27 @@ def proven(
     return replace(selection, stopped=stopped or selection.stopped), certificate
 
 
-def find_path(instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0) -> Found:
+def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
     """Find a path by a formulation, certified if a proof is requested.
 
-    ``offset``: constant added to the first objective of every path. On an interrupt the formulation
-    returns its incumbent. Raises `InfeasibleError` if no path is within all caps; `SolverError` if
-    the answer fails its check; `KeyboardInterrupt` if there is no incumbent yet.
+    On an interrupt the formulation returns its incumbent. Raises `InfeasibleError` if no path is
+    within all caps; `SolverError` if the answer fails its check; `KeyboardInterrupt` if there is no
+    incumbent yet.
     """
-
-    def raised(values: Sequence[float]) -> tuple[float, ...]:
-        return values[0] + offset, *values[1:]
-
-    def shifted(found: Finding) -> Finding:
-        return replace(found, objective=found.objective + offset, bound=found.bound + offset)
-
     formulation.require_options(run.options)
     limit = min(run.left, run.options.get("seconds", math.inf))
-    tell, seconds = run.progress, {"compile": 0.0}
-    watch = Watch(limit, None if tell is None else lambda found: tell(shifted(found)))
+    watch, seconds = Watch(limit, run.progress), {"compile": 0.0}
     with timed(seconds, "solve"):
-        selection = _selected(instance, formulation, run, watch, offset)
+        selection = _selected(instance, formulation, run, watch)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with timed(seconds, "verify"):
         judge = partial(judged, instance, formulation, selection)
         selection, certificate = proven(selection, judge, run)
-    trace = tuple(map(shifted, selection.trace))
-    objective, bound = raised(selection.objective), raised(selection.bound)
-    selection = replace(selection, objective=objective, bound=bound, trace=trace)
-    if certificate is not None:
-        values, bounds = raised(certificate.values), raised(certificate.bounds)
-        certificate = replace(certificate, values=values, bounds=bounds)
     return Found(selection, certificate, (), seconds)
 
 
-def _selected(
-    instance: Instance, formulation: Formulation, run: Run, watch: Watch, offset: float
-) -> Solution:
+def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
     limit = {} if math.isinf(run.left) else {"seconds": run.left}
@@ -250,7 +203,7 @@ def _selected(
 
         raise refusal(instance, name, exact=formulation.looks_at_all) from None
     except (NothingFoundError, TimeUpError) as error:
-        low = watch.bound + offset
+        low = watch.bound
         said = f"{error} (no path is below {low:.6g})" if math.isfinite(low) else str(error)
         raise (KeyboardInterrupt if watch.interrupted else type(error))(said) from error
     except SolverError as error:

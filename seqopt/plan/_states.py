@@ -10,16 +10,17 @@ from math import inf, isfinite
 from typing import Any
 
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution
+from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch
 from seqopt.graph.states._visits import steps_in_hands
 from seqopt.graph.states.explored import barred
 from seqopt.graph.states.states import States
+from seqopt.graph.states.walk import walk
 from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.plan._answers import Found, called, proven, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed
 from seqopt.work._workers import keep
 
-COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
+COUNTED = ("each", "stability")  # of a problem: they know what was computed
 
 
 def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
@@ -30,17 +31,20 @@ def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
     """
     formulation.require_options(run.options)
     start = time.perf_counter()
-    told = {} if run.progress is None else {"progress": run.progress}
-    limit = {"seconds": run.left} if isfinite(run.left) else {}
+    told: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
+    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
+    limit = {"watch": watch} if formulation.watched else {"seconds": run.left}
+    limit = limit if formulation.watched or isfinite(run.left) else {}
     with keep(problem.resources.executor, problem.resources.workers):
         with run.clock.needed("finding a first plan"):
             options = {**run.options, **told, **limit}
-            selection = _selected(formulation, problem, options, explain=run.explains)
-        selection = replace(selection, stopped=run.clock.why(selection.stopped))
+            selection = _selected(formulation, problem, options, run)
+        stopped = run.clock.why(selection.stopped)
+        selection = replace(selection, stopped=stopped, trace=watch.trace)
         solved = time.perf_counter()
         if run.proof and run.progress is not None:
             run.progress("proving that no plan is better")
-        twin = replace(problem)  # which knows nothing that was computed for the search
+        twin = replace(problem, answers={})  # it knows nothing that was computed for the search
         space = ordered(twin, selection.order).space
         steps = steps_in_hands(space, selection.states, selection.grips)
         hint = dict(enumerate(selection.visited, start=twin.space.first))
@@ -48,25 +52,39 @@ def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
         judge = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
         selection, certificate = proven(selection, judge, run)
     problem.certified.update(twin.certified)
-    seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
+    written = selection.compile_seconds
+    seconds = {"compile": written, "solve": solved - start - written}
+    seconds["verify"] = time.perf_counter() - solved
     return Found(selection, certificate, steps, seconds)
 
 
+def _walks(problem: States, formulation: Formulation, run: Run) -> bool:
+    """Return whether a formulation looks at one decision after the other, and no proof is asked."""
+    alone = formulation.window_options
+    asked = not run.proof and alone is not None and run.options in ({}, alone)
+    asked &= all(goal.of_criterion for goal in problem.aims)
+    return asked and problem.rules.names_robots() and not (problem.scenarios or problem.budgets)
+
+
 def _selected(
-    formulation: Formulation, problem: States, options: Mapping[str, Any], *, explain: bool
+    formulation: Formulation, problem: States, options: Mapping[str, Any], run: Run
 ) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     start, name, exact = time.perf_counter(), formulation.name, formulation.looks_at_all
-    limit = float(options.get("seconds", inf))
+    limit = min(run.left, float(options.get("seconds", inf)))
     if barred(problem) is not None:  # what every plan passes is asked before any is sought
-        raise confirmed(replace(problem), name, limit, explain=explain)
-    own = replace(problem)  # the formulation's: what it changes or leaves behind is its own
+        raise confirmed(replace(problem), name, limit, explain=run.explains)
+    if _walks(problem, formulation, run):
+        return walk(problem, Watch(run.left))
+    own = replace(
+        problem, judged={}
+    )  # the formulation's: what it changes or leaves behind is its own
     vars(own).update({key: vars(problem)[key] for key in COUNTED if key in vars(problem)})
     try:
         selection = called(name, Solution, partial(formulation.solve, own, **options))
     except InfeasibleError as error:
         left = limit - (time.perf_counter() - start)
-        why = confirmed(replace(problem), name, left, exact=exact, explain=explain)
+        why = confirmed(replace(problem), name, left, exact=exact, explain=run.explains)
         standing = problem.standing
         if type(why) is SolverError and standing is not None and standing.curing is not None:
             said = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -217,6 +218,16 @@ class ShownBuild(Shown):
         figure: Figure = draw(scene, self.steps, responses, (first, last), clock)
         return figure
 
+    def export(
+        self,
+        format: str = "tasks",  # noqa: A002  # the option's name
+        source: Path | str | None = None,
+        distance: float | None = None,
+    ) -> str:
+        """Return the build in a format of others, as of `seqopt.export`."""
+        text: str = display(ShownBuild, "export")(self, None, format, source, distance)
+        return text
+
     def report(self, *others: ShownBuild) -> Page:
         """Return a page that shows the build step by step, in three dimensions.
 
@@ -245,6 +256,8 @@ class GivenSequence(ShownBuild):
         What it is called beside others.
     standing : Standing, optional
         With what every state must stand: where mortar cures, steps wait for it.
+    result : str, optional
+        Where they come from, in words.
 
     Attributes
     ----------
@@ -272,7 +285,7 @@ class GivenSequence(ShownBuild):
     title: str = "sequence"
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False, hash=False)
     standing: Standing | None = None
-    result = "given, not optimized"
+    result: str = "given, not optimized"
     _begin = None
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,7 +25,7 @@ from seqopt.judge._schedules import ordered, plan_values
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._answers import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
-from seqopt.plan.pose import states_of
+from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import best_within, leaves
 from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
@@ -159,7 +160,7 @@ class Front(Terse):
     that no point is missing; ``seconds``: run times of solve and verify, s; ``moved``: largest
     displacements of plans, over the limit of the linear range, if computed; ``beyond``: why some
     exceed it, in words; ``stopped``: ``time`` or ``interrupt`` if the search ended early, else
-    empty.
+    empty; ``problem``: the `Problem` that was asked.
     """
 
     table: pd.DataFrame
@@ -170,6 +171,7 @@ class Front(Terse):
     moved: tuple[Moved, ...] = ()
     beyond: str = ""
     stopped: str = ""
+    problem: Any = None
 
     def __repr__(self) -> str:
         whole = "complete" if self.complete else "not complete"
@@ -192,30 +194,11 @@ def find_front(
 
     Its plans are within the linear range if any is, unless a limit on ``linear_range`` says so.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its goals are minimized simultaneously.
-    formulation : Formulation or str, optional
-        What finds the set.
-    rounding : mapping of str to float, optional
-        Steps to whose multiples values are rounded up, by goal, SI units, which thins the set.
-    seconds : float, optional
-        Limit of the search, which then returns the points found.
-    progress : callable, optional
-        Called with the progress.
-    clock : Clock, optional
-        Of search and proof.
-
-    Returns
-    -------
-    Front
-
-    Raises
-    ------
-    InfeasibleError, SolverError, TimeUpError
-        If no plan is feasible; if values differ from those claimed, or a point is missing; if no
-        plan is found in time.
+    ``problem``: its goals are minimized simultaneously; ``rounding``: steps to whose multiples
+    values are rounded up, by goal, SI units, which thins the set; ``seconds``: limit of the search,
+    which then returns the points found; ``clock``: of search and proof. Raises `InfeasibleError`,
+    `SolverError` or `TimeUpError` if no plan is feasible; if values differ from those claimed, or a
+    point is missing; if no plan is found in time.
 
     Examples
     --------
@@ -232,14 +215,14 @@ def find_front(
 
     def measured(asked: Problem) -> Front:
         with watch.needed("posing the problem"):
-            states = states_of(asked)
+            states = graph_of(asked)
             posed = FrontProblem(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
 
         pairs = zip(front.engines, front.steps, strict=True)
         moved = tuple(most_moved(engine, steps) for engine, steps in pairs)
-        return replace(front, moved=moved)
+        return replace(front, moved=moved, problem=problem)
 
     def farthest(front: Front) -> Moved | None:  # all of its plans keep the range, or none can
         return max(front.moved, key=lambda each: each.share, default=None)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, partial
 from math import isfinite
 from typing import Any
 
 import pandas as pd
 
+from seqopt._showing import display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError
-from seqopt.graph.decisions import Decisions, Windows
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states.states import States
@@ -25,7 +24,6 @@ from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
-from seqopt.responses._choices import window_models
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import length_text
@@ -73,9 +71,7 @@ class Plan(ShownBuild):
     steps : tuple of Step
         The steps of the build, checked; none of costs that are given without steps.
     seconds : mapping of str to float
-        By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
-    search : Windows or None
-        The models solved by a search without proof; None if all were solved.
+        By stage, s: assemble, compile (preparing a program for a solver), solve, verify.
     arms : seqopt.arms._kept.KeptPostures or None
         The postures of arms; None where no robot has one, or a graph was solved.
     moved : Moved or None
@@ -83,6 +79,8 @@ class Plan(ShownBuild):
         where a graph was solved.
     beyond : str
         Why it leaves the linear range although plans that keep it are preferred; empty otherwise.
+    changes : mapping of str to object
+        Of one of `seqopt.replan` what is other than planned; empty otherwise.
 
     Examples
     --------
@@ -101,16 +99,21 @@ class Plan(ShownBuild):
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
-    search: Windows | None = None
     arms: Any = None
     moved: Moved | None = None
     beyond: str = ""
+    changes: Mapping[str, object] = field(default_factory=dict, compare=False, hash=False)
 
     def __repr__(self) -> str:
         what = f"{self.engine.network.scene.name!r}, {self.method!r}, " if self.steps else ""
         count = f"{len(self.steps)} steps" if self.steps else f"{len(self.nodes)} nodes"
         outside = f"{OUTSIDE}: " if self.outside else ""
         return f"Plan({outside}{what}by {self.formulation.name}: {count}, {self._value})"
+
+    @property
+    def replan(self) -> Callable[..., Plan]:
+        """Plan the rest after a change, as `seqopt.replan`: ``plan.replan(12, lost=["rob3"])``."""
+        return partial(display(Plan, "replan"), self)
 
     @property
     def is_far(self) -> bool:
@@ -133,20 +136,8 @@ class Plan(ShownBuild):
         return (Departure(FAR_OFF, said, (self.moved.step,)), *found)
 
     @property
-    def decisions(self) -> Decisions:
-        """The candidates of moves; raises `ProblemError` if states were chosen."""
-        found = self._of_scene.decisions
-        if found is None:
-            raise ProblemError(
-                "the plan has no moves to show: it was chosen from states, which have no candidates"
-            )
-        return found
-
-    @property
     def states(self) -> States:
-        """The graph of states; raises `ProblemError` if candidates were chosen."""
-        if self._of_scene.decisions is not None:
-            raise ProblemError("the plan was chosen from candidates, not from states of the build")
+        """The states and moves that it was chosen from."""
         return self._of_scene
 
     @property
@@ -174,7 +165,8 @@ class Plan(ShownBuild):
         """The name of the plan where it is shown next to others."""
         if self.order:
             return "best order"
-        return self.graph.title or self.formulation.name
+        opens_grips = self.steps and self._of_scene.rules.moves
+        return self.formulation.name if opens_grips else self.graph.title or self.formulation.name
 
     @property
     def order(self) -> Order:
@@ -184,7 +176,7 @@ class Plan(ShownBuild):
     @property
     def goals(self) -> tuple[str, ...]:
         """Names of goals, the most important first, then of budgets."""
-        return self.graph.names_of(self.formulation.aim)
+        return self.graph.names
 
     @property
     def objective(self) -> dict[str, float]:
@@ -196,7 +188,7 @@ class Plan(ShownBuild):
 
     def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names, a tilt in degrees."""
-        return self.graph.in_display_units(self.formulation.aim, values)
+        return self.graph.in_display_units(values)
 
     @property
     def bound(self) -> dict[str, float | None]:
@@ -269,13 +261,14 @@ class Plan(ShownBuild):
 
     @property
     def choice(self) -> tuple[int, ...]:
-        """The chosen candidate of every move; raises `ProblemError` if states were chosen."""
-        return self.graph.chosen_candidates(self.selection.states)
+        """The number of the chosen candidate of every move; raises `ProblemError` without moves."""
+        pairs = zip(self._of_scene.rules.moves, self.nodes, strict=True)
+        return tuple(move.candidates.index(node) for move, node in pairs)
 
     @property
     def nodes(self) -> tuple[int, ...]:
         """The node chosen for every move, or the nodes of a path through an instance."""
-        return self.graph.chosen_nodes(self.selection.states)
+        return self.graph.chosen_nodes(self.steps, self.selection.states)
 
     @property
     def _begin(self) -> Site | None:  # type: ignore[override]
@@ -284,11 +277,7 @@ class Plan(ShownBuild):
     @property
     def models(self) -> int:
         """How many different models were solved."""
-        if self.search is None:
-            own = self.graph.models
-        else:  # the graph would solve them all to count them
-            own = window_models(self.decisions.schedule, self.choice)
-        return own + self.selection.effort[1]
+        return self.graph.models + self.selection.effort[1]
 
     @property
     def regrips(self) -> int:
@@ -350,7 +339,7 @@ class Plan(ShownBuild):
             "scene": scene.name,
             "schedule": self.method,
             **self._named(),
-            **graph.described(self.formulation.aim, _said_limits(asked.limits)),
+            **graph.described(_said_limits(asked.limits)),
             "candidates": f"heuristic: {graph.among}" if graph.among else "all",
             **self._answer(),
             "budgets": graph.spent(self.objective, self.selection),
@@ -378,15 +367,7 @@ class Plan(ShownBuild):
         ``computed``, beside grip forces, which come with all; ``verdicts``: ``asked`` of grip sets,
         and the linear ``programs`` that these took.
         """
-        graph, proof, moves = self._of_scene, self.certificate, self.graph.candidates
-        asked = {limit.response for limit in graph.limits}.union(
-            *(g.responses for g in graph.goals)
-        )
-        by_criterion = moves or any(goal.of_criterion for goal in graph.goals)
-        computed = {*()} if moves else {*graph.sets.names}
-        for bricks in {m.bricks for m in self.decisions.schedule.moves} if moves else {1}:
-            asked.update(graph.criterion.wanted(bricks) if by_criterion else ())
-            computed.update(self.decisions.evaluation.wanted(bricks) if moves else ())
+        graph, proof = self._of_scene, self.certificate
         stands = None if graph.standing is None else graph.stability
         return {
             "models": {
@@ -395,7 +376,7 @@ class Plan(ShownBuild):
                 "proof": None if proof is None or self.gap is None else proof.models or self.models,
                 "states": 0 if proof is None else proof.states,
             },
-            "responses": {"asked": sorted(asked), "computed": sorted(computed)},
+            "responses": {"asked": sorted(graph.asked), "computed": sorted(graph.sets.names)},
             "verdicts": {
                 "asked": 0 if stands is None else stands.looked_at,
                 "programs": 0 if stands is None else stands.programs,

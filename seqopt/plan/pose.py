@@ -1,4 +1,4 @@
-"""Pose a problem: what is asked of a build, and the graph of choices that it becomes."""
+"""Pose a problem: what is asked of a build, and the graph of states that it becomes."""
 
 from __future__ import annotations
 
@@ -9,20 +9,11 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
-from seqopt.graph.decisions import pose_decisions
-from seqopt.graph.states.states import States, build_states, of_decisions, over_scenarios, within
+from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.filters import Filter
-from seqopt.problem.problem import (
-    WORST_PEAK,
-    Aim,
-    Orders,
-    Problem,
-    RobustAim,
-    check_parts,
-    parse_budgets,
-)
-from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
+from seqopt.problem.requirements import Criterion, Limit, require_parts
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
@@ -45,7 +36,6 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     scenarios: Scenarios | Sequence[Scene] = (),
     over: RobustAim | str = WORST_PEAK,
     orders: Orders | str | None = None,
-    also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
     """Create a `Problem` of a build; strings are parsed.
@@ -57,7 +47,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     goals : sequence of Amount or str, optional
         As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
         largest, as the formulation minimizes, and of rules the worst step.
-    limits, budgets, stands, scenarios, over, orders, also, resources : optional
+    limits, budgets, stands, scenarios, over, orders, resources : optional
         As of `Problem`: ``"F_largest=300"``, ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`,
         ``"cvar=0.9"`` (or ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
 
@@ -81,8 +71,9 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     """
     asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
-    more = {"also": also, "resources": resources}
-    problem = Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more)
+    engine = simplest(engine)
+    require_parts(engine, moves, criterion)
+    problem = Problem.asked(engine, moves, criterion, **asked, **worlds, resources=resources)
     posed = replace(problem, criterion=graph_of(problem).criterion)  # with the scene's numbers
     posed.graphs.update(problem.graphs)
     return posed
@@ -94,53 +85,47 @@ def chooses_moves(problem: Problem) -> bool:
     return problem.moves.has_pairs and not (problem.is_timed or problem.goals or beside)
 
 
-def graph_of(problem: Problem, *, moves: bool | None = None) -> States:
-    """Return the graph of choices of a problem, cached with what was computed for it.
+def goals_of(problem: Problem, aim: Aim | None = None) -> tuple[Amount, ...]:
+    """Return the goals of a problem; where it names none, what a formulation minimizes.
 
-    ``moves``: whether candidates of moves are chosen, not states; by default as `chooses_moves`.
-    Raises `ProblemError` if the problem has no such graph.
+    Over scenarios that is as these are joined. ``aim``: of the formulation; by default of open
+    grips the sum of costs, of free rules the worst step.
     """
-    of_moves = chooses_moves(problem) if moves is None else moves
-    name = "moves" if of_moves else "states"
-    if name not in problem.graphs:
-        problem.graphs[name] = (_of_moves if of_moves else _of_states)(problem)
-    found: States = problem.graphs[name]
-    return found
+    if problem.goals:
+        return problem.goals
+    usual = Aim.SUM if chooses_moves(problem) else Aim.PEAK
+    return (AIMS[problem.over.aim if problem.scenarios else aim or usual],)
 
 
-def states_of(problem: Problem) -> States:
-    """Return the states and moves of a problem."""
-    return graph_of(problem, moves=False)
+def graph_of(problem: Problem, aim: Aim | None = None) -> States:
+    """Return the states and moves of a problem, cached with what was computed for them.
 
-
-def _of_moves(problem: Problem) -> States:
-    """Return the graph of candidates of moves; over scenarios with limits that hold in all.
-
-    Raises a `ProblemError` for goals and constraints that candidates of moves do not support.
+    ``aim``: as of `goals_of`. Raises `ProblemError` if the problem has no such graph.
     """
-    why = {
-        "orders": problem.orders is not None,
-        f"aim {', '.join(map(str, problem.goals))}": problem.goals not in ((), (SUM,), (MINMAX,)),
-        "stands": problem.stands is not None,
-        f"filter {', '.join(map(str, problem.filters))}": bool(problem.filters),
-        f"resource {', '.join(map(str, problem.paths))}": bool(problem.paths),
-    }
-    if (name := next((name for name, asked in why.items() if asked), None)) is not None:
+    goals = goals_of(problem, aim)
+    if chooses_moves(problem) and not problem.moves.moves:
         raise ProblemError(
-            f"{name}: it is about states of the build, not about candidates alone; take "
-            "schedule_search or another formulation of states"
+            f"schedule {problem.method}: with {len(problem.scene.bricks)} bricks it leaves no grip "
+            "open; there is nothing to choose, analyze its steps"
         )
-    budgets = parse_budgets(problem.budgets)
-    if problem.scenarios and budgets:
-        raise ProblemError(
-            f"budget {problem.budgets[0]}: aims over scenarios take none where candidates are "
-            "chosen; leave it out, or name aims"
-        )
-    also = (*problem.also, *(budget.response for budget in budgets if budget.response))
-    asked = problem.engine, problem.schedule, problem.criterion, problem.limits
-    decisions = pose_decisions(*asked, also, problem.resources)
-    found = of_decisions(replace(decisions, budgets=budgets))
-    return over_scenarios(found, problem.scenarios, problem.over) if problem.scenarios else found
+    if goals not in problem.graphs:
+        found = _of_states(replace(problem, goals=goals))
+        known = next(iter(problem.graphs.values()), found)
+        problem.graphs[goals] = replace(found, answers=known.answers, judged=known.judged)
+    out: States = problem.graphs[goals]
+    return out
+
+
+def default_formulation(problem: Problem) -> str:
+    """Return the name of the formulation that solves a problem if none is named."""
+    graph = graph_of(problem)
+    if not chooses_moves(problem):
+        return graph.default_formulation
+    if problem.scenarios and graph.totals:
+        return "scenario_search"
+    if problem.scenarios:
+        return "schedule_search" if problem.budgets else "minimax"
+    return "labels" if problem.budgets else "overlap_dp"
 
 
 def _of_states(problem: Problem) -> States:
@@ -159,10 +144,9 @@ def _of_states(problem: Problem) -> States:
 def _states(problem: Problem) -> States:
     """Return the graph of states of a problem, with goals, constraints and scenarios."""
     over = problem.over if problem.scenarios else WORST_PEAK
-    goals = problem.goals or (AIMS[over.aim],)
-    asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
+    asked = problem.engine, problem.moves, problem.criterion, problem.goals, problem.limits
     found = build_states(*asked, problem.stands)
-    check_parts(problem.filters)
+    check_parts(problem.filters, problem.scene, problem.moves)
     found = replace(found, resources=problem.resources, filters=problem.filters)
     found = replace(found, paths=problem.paths)
     space = found.space
@@ -175,8 +159,8 @@ def _states(problem: Problem) -> States:
         )
     if problem.paths and problem.scenarios and over.aim is Aim.SUM:
         raise ProblemError(f"resource {problem.paths[0]}: totals over scenarios take none")
-    if caps := parse_budgets(problem.budgets, of_states=True):
-        found = within(found, {cap.name: cap.bound for cap in caps})
+    caps: dict[Amount | str, float] = {c.amount: c.bound for c in problem.budgets if not c.share}
+    found = within(found, caps) if caps else found
     if found.standing is not None and found.standing.curing is not None and not found.is_timed:
         raise ProblemError(
             "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt._registry import offered
 from seqopt.errors import SeqoptError, StepError
@@ -12,9 +13,10 @@ from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
+from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.responses.table import analyze
 from seqopt.scene._armed import check_postures
-from seqopt.sequence.rules import Payload
+from seqopt.sequence.rules import FREE, Payload, _usual_grips
 from seqopt.sequence.steps import Step, _begin_step
 
 
@@ -60,3 +62,35 @@ def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
     except SeqoptError as error:
         out["broken"] = str(error)
     return out | {"differs": first, "steps": len(plan.steps), "steps_before": len(old)}
+
+
+def asked_before(summary: Any, *, lost: bool = False) -> dict[str, Any]:
+    """Return what a plan was asked, in words, from its summary.
+
+    ``lost``: with the defaults of fewer robots.
+    """
+    if not isinstance(summary, dict) or summary.get("schedule") != FREE:
+        summary = {}
+    given = [
+        each if isinstance(each, dict) else {} for each in map(summary.get, ("rules", "limits"))
+    ]
+    rules, limits = (
+        {name: str(value) for name, value in each.items() if isinstance(value, str | int | float)}
+        for each in given
+    )
+    team = given[0].get("robots")
+    if lost and isinstance(team, list) and rules.get("least_grips") == str(_usual_grips(len(team))):
+        del rules["least_grips"]
+    names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
+    criterion, aims = summary.get("criterion"), summary.get("aims")
+    return {
+        "direction": rules.get("direction"),
+        "aim": ",".join(map(str, aims if isinstance(aims, list) else ())) or None,
+        "criterion": criterion if isinstance(criterion, str) else None,
+        "rules": tuple(f"{name}={rules[name]}" for name in names if name in rules),
+        "limits": tuple(
+            f"{name}={value}"
+            for name, value in limits.items()
+            if name != PROP_EXCESS  # which the scene says
+        ),
+    }

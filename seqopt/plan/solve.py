@@ -1,8 +1,8 @@
-"""From a problem to its plan: a graph of choices, a formulation, a judge.
+"""From a problem to its plan: a graph of states, a formulation, a judge.
 
-A problem becomes a graph: of decisions, or of states of a build; an instance has its arcs. A
-formulation chooses a path through it. The judge computes its values and a bound again, from the
-problem's own data. What was found and proven is the plan.
+A problem becomes the graph of the states of its builds; an instance has its arcs. A formulation
+chooses a path through it. The judge computes its values and a bound again, from the problem's own
+data. What was found and proven is the plan.
 """
 
 from __future__ import annotations
@@ -13,43 +13,27 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
-import numpy as np
-
-from seqopt.errors import (
-    InfeasibleError,
-    ProblemError,
-    SeqoptError,
-    SolverError,
-    StepError,
-    message_of,
-)
-from seqopt.graph.decisions import Decisions, walk_windows
-from seqopt.graph.formulation import End, Formulation, Run, Solution, Watch, formulations, timed
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, message_of
+from seqopt.graph.formulation import End, Formulation, Run, as_formulation
 from seqopt.graph.instance import Instance
-from seqopt.graph.states.states import States, of_decisions
-from seqopt.judge._step_checks import check_shape
-from seqopt.plan._answers import Found, find_path, require_fit, require_time
+from seqopt.graph.states.states import States
+from seqopt.plan._answers import find_path, require_time
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import AIMS, chooses_moves, graph_of
-from seqopt.problem.amounts import Amount
-from seqopt.problem.problem import Aim, Problem
+from seqopt.plan.pose import default_formulation, graph_of
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
 from seqopt.responses._grip_sets import Moved, most_moved
-from seqopt.scene._armed import check_postures
 from seqopt.scene.arm import from_arms
-from seqopt.sequence._rule_check import check_carried
-from seqopt.sequence.steps import Step
 from seqopt.work.progress import INTERRUPT
 
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
 Measured = TypeVar("Measured", bound=Any)  # a plan, or a Pareto set
-EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 
 
 def solve(
-    problem: Problem | States | Decisions | Instance,
+    problem: Problem | States | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -102,14 +86,15 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     A proof without time is left out: values and bounds are claimed only. Raises `TimeUpError` if
     there is no plan in time.
     """
-    if isinstance(problem, Decisions):
-        problem = of_decisions(problem)
     if isinstance(problem, States | Instance):
         return _chosen(problem, problem.formulation(formulation), run)
     if not isinstance(problem, Problem):
         kind = type(problem).__name__
         raise ProblemError(f"a {kind} is not a problem; give one that seqopt.pose made")
-    moves, found = _fitting(problem, graph_of(problem).formulation(formulation))
+    given, problem = problem, without_shares(problem, run)
+    found = as_formulation(
+        formulation or default_formulation(problem), *graph_of(problem).questions
+    )
     end = time.perf_counter() + run.time_limit
 
     def best(asked: Problem) -> Plan:
@@ -119,7 +104,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
         def solved(one: Problem) -> Plan:
             with run.clock.needed("posing the problem"):
-                graph = graph_of(one, moves=moves)
+                graph = graph_of(one, found.aim)
             return _chosen(graph, found, how)
 
         plan = solved(asked)
@@ -132,22 +117,27 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     def interrupted(plan: Plan) -> Plan:
         return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
 
-    return replace(best_within(problem, best, lambda p: p.moved, interrupted), problem=problem)
+    return replace(best_within(problem, best, lambda p: p.moved, interrupted), problem=given)
 
 
-def _fitting(problem: Problem, formulation: Formulation) -> tuple[bool, Formulation]:
-    """Return whether a formulation chooses candidates of moves, and it with the asked aim."""
-    moves, aim = chooses_moves(problem), formulation.aim
-    totals = problem.scenarios and problem.over.aim is Aim.SUM
-    if moves and formulation.of_states and not totals:
-        return False, formulation
-    asked: dict[tuple[Amount, ...], Aim | None] = {(goal,): each for each, goal in AIMS.items()}
-    asked[()] = aim  # its own, where none is asked
-    could = problem.moves.has_pairs and problem.goals in asked
-    could &= not (problem.is_timed or problem.orders)
-    if aim is None or not (moves or could):
-        return moves, formulation
-    return True, replace(formulation, aim=asked[problem.goals])
+def without_shares(problem: Problem, run: Run | None = None) -> Problem:
+    """Return a problem whose budgets are amounts: shares of what the best plan without them takes.
+
+    ``run``: of the clock that runs.
+    """
+    shares = [cap for cap in problem.budgets if cap.share]
+    if not shares:
+        return problem
+    from seqopt.judge._schedules import plan_values  # noqa: PLC0415  # with its proofs
+
+    free = replace(problem, budgets=())
+    plan = _solve_run(free, None, Run(proof=False, clock=(run or Run()).clock))
+    asked = replace(graph_of(free), goals=tuple(cap.amount for cap in shares))
+    taken = dict(zip(shares, plan_values(asked, plan.steps), strict=True))
+    caps = (
+        replace(c, bound=c.bound * taken[c], share=False) if c.share else c for c in problem.budgets
+    )
+    return replace(problem, budgets=tuple(caps))
 
 
 def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Plan:
@@ -156,91 +146,14 @@ def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Pla
     Raises `InfeasibleError` if no choice is feasible; `ProblemError` if graph, formulation and
     options are incompatible; `SolverError` if an answer fails its check.
     """
+    require_time(formulation, run.time_limit)
     if isinstance(graph, Instance):
-        require_time(formulation, run.time_limit)
         found = find_path(graph, formulation, run)
-    elif graph.decisions is not None:
-        found = _from_decisions(graph, graph.decisions, formulation, run)
     else:
         from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
 
         found = find_states(graph, formulation, run)
     return Plan(graph, graph.at(found.selection.order), formulation, *found)
-
-
-def _from_decisions(
-    graph: States, decisions: Decisions, formulation: Formulation, run: Run
-) -> Found:
-    """Choose candidates of all moves, for one scene or over scenarios."""
-    require_fit(decisions.budgets, formulation, run.options)
-    require_time(formulation, run.time_limit)
-    require_time(formulation, run.clock.left)
-    limit = min(run.time_limit, run.options.get("seconds", math.inf))
-    own = {name: value for name, value in run.options.items() if name not in EFFORT}
-    run = replace(run, options=own, time_limit=limit)
-    decisions.require_possible(graph.worlds)
-    if graph.scenarios and not run.proof:
-        raise ProblemError("the costs of all choices are needed; ask for the proof")
-    if not run.proof:
-        return _by_windows(graph, decisions, formulation, run)
-    return _by_all_costs(graph, decisions, formulation, run)
-
-
-def _by_all_costs(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
-    """Choose by the costs of all choices; the answer is certified."""
-    aim, seconds = formulation.aim or Aim.SUM, dict[str, float]()
-    with run.clock.needed("computing the responses of all choices"):
-        with timed(seconds, "respond"):
-            stages = {} if graph.costs_in_scenarios else decisions.seconds(aim)
-        seconds |= stages  # of one scene costs are a stage of their own
-        with timed(seconds, "compile"):
-            worlds: Any = {"each": graph.costs_in_scenarios, "over": graph.over}
-            found = decisions.compiled(formulation.aim, alone=formulation.alone, **worlds)
-    path = find_path(found.instance, formulation, run, found.offset)
-    choice = found.choice([node for (node,) in path.selection.states])
-    seconds |= path.seconds | {"compile": seconds["compile"] + path.seconds["compile"]}
-    proof = path.certificate
-    with timed(seconds, "verify"):
-        if proof is not None:
-            spent = {budget.name: budget.spent(choice) for budget in decisions.caps}
-            proof = replace(proof, spent=spent)  # amounts below zero and without a bound as well
-        steps = _checked(decisions.steps(choice), graph, decisions)
-    seconds["verify"] += path.seconds["verify"]
-    selection = replace(path.selection, states=decisions.rows(choice))
-    return Found(selection, proof, steps, seconds)
-
-
-def _by_windows(graph: States, decisions: Decisions, formulation: Formulation, run: Run) -> Found:
-    """Choose by a window search that evaluates only the models it visits; without certificate."""
-    alone = formulation.window_options
-    if alone is None or run.options not in ({}, alone):
-        known = formulations("costs")
-        able = [name for name in known if known[name].window_options is not None]
-        options = "".join(f" {name}={value}" for name, value in run.options.items())
-        raise ProblemError(
-            f"{formulation.name}{options} looks beyond the window of a move and needs all models: "
-            f"use {' or '.join(able)} without options, or ask for the proof"
-        )
-    seconds: dict[str, float] = {}
-    with timed(seconds, "search"):
-        found = walk_windows(decisions, Watch(run.left))
-    with timed(seconds, "verify"):
-        steps = _checked(decisions.steps(found.choice), graph, decisions)
-    chosen = Solution(decisions.rows(found.choice), (np.nan,), (-np.inf,))
-    return Found(chosen, None, steps, seconds, found)
-
-
-def _checked(steps: tuple[Step, ...], graph: States, decisions: Decisions) -> tuple[Step, ...]:
-    """Return steps after checking postures, shape and payloads; raise a `SolverError` otherwise."""
-    schedule, limits = decisions.schedule, decisions.limits
-    try:
-        check_postures(schedule.scene, steps)
-        for each in graph.scenarios or (graph.engine,):
-            check_shape(each, steps, limits)
-        check_carried(graph.network.scene, steps, graph.worlds)
-    except StepError as error:
-        raise SolverError(f"a choice is not allowed: {error}") from error
-    return steps
 
 
 def on_the_way(plan: Plan) -> Plan:

@@ -10,7 +10,6 @@ import pandas as pd
 
 from seqopt.contact.mortar import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.graph.decisions import Decisions
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
@@ -19,8 +18,7 @@ from seqopt.problem.criteria import (
     WorstRatio,
     equal,
 )
-from seqopt.problem.requirements import NAMES, Criterion, number_word, split_word
-from seqopt.responses._choices import CHOICE_RESPONSES
+from seqopt.problem.requirements import CHOICE_RESPONSES, NAMES, Criterion, number_word, split_word
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns
 from seqopt.scene.parts import Anywhere, Robot, Side
@@ -185,15 +183,6 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
     """
     source = resources.files("seqopt").joinpath("data/paper/three_robot_plan.csv")
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
-
-
-def published_choice(problem: Decisions) -> tuple[int, ...]:
-    """Return the published node of every move of the loop, as index among its candidates."""
-    schedule = problem.schedule
-    plan = published_plan(schedule.scene)
-    robots = [robot.name for robot in schedule.scene.robots]
-    nodes = [plan[m.step - 1].grips[robots.index(m.robot)] or 0 for m in schedule.moves]
-    return tuple(m.candidates.index(n) for m, n in zip(schedule.moves, nodes, strict=True))
 
 
 def paper_models(schedule: Schedule) -> tuple[int, int]:
