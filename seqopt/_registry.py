@@ -24,7 +24,10 @@ VIEWS = {
     "Schedule.gantt": "seqopt.report._gantt:gantt_picture",
     "ShownBuild.plot": "seqopt.report._pictures:steps_picture",
     "ShownBuild.gantt": "seqopt.report._gantt:gantt_picture",
+    "ShownBuild.export": "seqopt.exchange.exports:export",
+    "Plan.replan": "seqopt.questions:replan",
     "ShownBuild.report": "seqopt.report._pages:build_page",
+    "Page.widget": "seqopt.report._widget:step_viewer",
     "FailureMap.plot": "seqopt.report.charts:failure_figure",
     "RegretTable.plot": "seqopt.report._regret._chart:regret_chart",
 }
@@ -34,6 +37,7 @@ OFFERS = {
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
     "find_postures": "seqopt.arms.reach",
+    "read_measured": "seqopt.exchange.imports",
     "hold_alike": "seqopt.arms._permits",
     "permits": "seqopt.arms._permits",
     "with_postures": "seqopt.arms._kept",
@@ -106,23 +110,23 @@ class Command(Part):
 
 
 COMMANDS = {
-    name: Command(name, f"seqopt._cli.commands.{home}", about)
+    name: Command(name, f"seqopt._cli.commands.{home}:run", about)
     for name, home, about in (
-        ("compare", "compare:compare", "show all ways to build a scene side by side"),
-        ("optimize", "optimize:run", "choose where robots hold, and write the plan"),
-        ("replan", "replan:replan", "plan the rest of a build after a change"),
-        ("pareto", "pareto:pareto", "find all plans that no other one beats in every aim"),
-        ("sweep", "sweep:run", "plan many problems, a row of a table for each"),
-        ("analyze", "analyze:analyze", "compute forces and displacements in every step"),
-        ("times", "times:times", "say how long a build takes, and who does what when"),
-        ("assess", "assess:assess", "prove which steps stand, and with what margins"),
-        ("report", "report:report", "make a page that shows plans step by step"),
-        ("reach", "reach:reach", "say which arms reach which nodes, and how"),
-        ("scene", "scene:run", "check, describe, export or list scenes"),
-        ("import", "importing:run", "make a scene of an assembly of COMPAS, a mesh or a table"),
-        ("export", "exporting:export", "write a plan in a format of others"),
-        ("instance", "instance:instance", "write the graph of a problem, for any solver"),
-        ("judge", "judge:run", "check a bare solution of an instance, and a bound"),
+        ("compare", "compare", "show all ways to build a scene side by side"),
+        ("optimize", "optimize", "choose where robots hold, and write the plan"),
+        ("replan", "replan", "plan the rest of a build after a change"),
+        ("pareto", "pareto", "find all plans that no other one beats in every aim"),
+        ("sweep", "sweep", "plan many problems, a row of a table for each"),
+        ("analyze", "analyze", "compute forces and displacements in every step"),
+        ("times", "times", "say how long a build takes, and who does what when"),
+        ("assess", "assess", "prove which steps stand, and with what margins"),
+        ("report", "report", "make a page that shows plans step by step"),
+        ("reach", "reach", "say which arms reach which nodes, and how"),
+        ("scene", "scene", "check, describe, export or list scenes"),
+        ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
+        ("export", "exporting", "write a plan in a format of others"),
+        ("instance", "instance", "write the graph of a problem, for any solver"),
+        ("judge", "judge", "check a bare solution of an instance, and a bound"),
     )
 }
 """The commands that are always there, by name."""

@@ -11,16 +11,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from seqopt._files import read_text
 from seqopt._registry import offered
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
-from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.formulation import Formulation, Run, as_formulation, find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of, pose
+from seqopt.plan.pose import default_formulation, pose
 from seqopt.plan.solve import _solve_run
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.filters import Filter, parse_limits
@@ -32,18 +31,17 @@ from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scenarios import scenarios as sample
-from seqopt.scene.scene import Scene, in_order
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules, with_robots
+from seqopt.scene.scene import Scene
+from seqopt.sequence.part import Part, _Place, find_scene
+from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule, read_plan, without
-from seqopt.sequence.steps import Site, Step, StepKind
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import Site, StepKind
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell
 
 SPREADS = ("stiffness", "density", "position", "grips")
 SEARCH = "search"  # the order that is sought
-FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 
 
@@ -173,7 +171,8 @@ class Robust:
 
     Examples
     --------
-    >>> Robust(vary={"stiffness": 2}, count=3).draw(load_scene("arch25")).settings["stiffness"]
+    >>> scene = find_scene("arch25")
+    >>> Robust(vary={"stiffness": 2}, count=3).draw(scene).settings["stiffness"]
     [0.5, 2.0]
     """
 
@@ -204,53 +203,6 @@ class Robust:
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Place:
-    """Where a build begins or ends, and the steps that led there, if known."""
-
-    site: Site | None = None
-    done: tuple[Step, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Part:
-    """Which steps a build may have, between which states, after which changes.
-
-    Parameters
-    ----------
-    schedule : Schedule, pathlib.Path or str, optional
-        free: any robot may release, hold or place next, or a sequence with open grips, by name (of
-        all robots), or a CSV file of steps; open grips are marked ? in it (default: the loop of
-        three robots, or of two where there is no third).
-    begin : Site, int or str, optional
-        Where the build begins: after a step of a plan (its folder or CSV file, of one step too);
-        or with so many bricks that nobody holds.
-    to : Site, int or str, optional
-        Where it ends, said in the same ways; a number of bricks, of a take-down those that stay,
-        leaves grips to the rule ending.
-    direction : str, optional
-        Of a free schedule: take-down removes bricks, the newest first, from the whole structure to
-        the empty site, if nothing else is said.
-    lost : sequence of str, optional
-        Robot that lets go where the build begins, and takes no further part.
-    missing : sequence of int, optional
-        Brick that is not there: one that stood is placed again next, one that was still to come
-        waits until all are placed that do not hang on it.
-
-    Examples
-    --------
-    >>> optimize("chain:bricks=7", Part(schedule="free", to=4)).steps[-1].bricks
-    4
-    """
-
-    schedule: Schedule | Path | str | None = None
-    begin: Site | _Place | int | str | None = None
-    to: Site | _Place | int | str | None = None
-    direction: str | None = None
-    lost: Sequence[str] = ()
-    missing: Sequence[int | str] = ()
-
-
 def optimize(  # noqa: PLR0913  # every question is a word of its own
     scene: Scene | str | Path,
     schedule: Schedule | Part | Path | str | None = None,
@@ -262,7 +214,6 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     limits: Sequence[Limit | Filter | str] | str = (),
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
-    also: Sequence[str] = (),
     robust: Robust | None = None,
     order: str | Sequence[int] | None = None,
     mortar: Mortar | str | None = None,
@@ -277,7 +228,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
-        The scene, the name of a built-in scene, a few words, or a scene file.
+        The scene, the name of a built-in scene, a few words, a scene file, or a plan's folder.
     schedule : Schedule, Part, pathlib.Path or str, optional
         The schedule, its file, a name in `seqopt.sequence.methods.SCHEDULES`, or ``"free"``; a
         `Part` says where the build begins and ends.
@@ -313,8 +264,6 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE.
     stands : Standing, Mortar or str, optional
         What every state must be proven to stand with: ``"dry"``, ``"epoxy"``, a strength.
-    also : sequence of str
-        Further responses to compute, besides those that are needed.
     robust : Robust, optional
         Over which scenarios, and what counts of them.
     order : str or sequence of int, optional
@@ -360,7 +309,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     clock = Clock(search.time_limit)
     with clock.needed("posing the problem"):
         problem = pose_build(asked)
-        found = as_formulation(formulation or graph_of(problem).default_formulation)
+        found = as_formulation(formulation or default_formulation(problem))
         options = search.parse_options(found)
     run = Run(search.time_limit, progress, search.proof, options, clock=clock)
     assemble = time.perf_counter() - start
@@ -374,22 +323,19 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     stands, robust, search = asked["stands"], asked["robust"], asked["search"]
     part = given if isinstance(given, Part) else Part(schedule=given)
     free, sought = part.schedule == FREE, order == SEARCH
-    scene = asked["scene"]
-    scene = load_scene(scene) if isinstance(scene, str | Path) else scene
-    scene = in_order(scene, None if sought else order)
-    if isinstance(robots, int):
-        scene, robots = with_robots(scene, robots), None
+    scene = find_scene(asked["scene"], order=None if sought else order, robots=robots)
+    robots = None if isinstance(robots, int) else robots
     if part.direction == Direction.TAKE_DOWN.value and not free:
         raise ProblemError(f"direction {part.direction}: it goes with schedule={FREE!r}")
-    scene, begin = _find_start(scene, part, stands)
+    scene, begin = part.change(scene, _with_ages(scene, part.find_begin(scene), stands))
     if part.lost:
         robots = [robot.name for robot in scene.robots if robot.name not in part.lost]
-    end = _find_place(part.to, "to", scene).site
+    end = part.find_end(scene)
     find_postures(scene, search.cache, asked["progress"])
     own = make_engine(asked["engine"], build_network(scene), asked["mortar"])
     moves = _find_moves(own.network, part, robots, asked["candidates"], asked["rules"])
-    if begin.site is not None or end is not None:
-        moves = replace(moves.free(), begin=begin.site, finish=end)
+    if begin is not None or end is not None:
+        moves = replace(moves.free(), begin=begin, finish=end)
     limits: Sequence[Any] = parse_limits(asked["limits"], scene)
     states = asked["aim"] or stands or sought or not moves.has_pairs
     states = states or any(isinstance(each, Filter) for each in limits)
@@ -409,10 +355,7 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
         scenarios=() if robust is None else robust.scenes or robust.draw(scene),
         over=over,
         orders=Orders.TIED if sought else None,
-        also=asked["also"],
-        resources=Resources(
-            search.workers, search.executor, search.memory, None if states else asked["progress"]
-        ),
+        resources=Resources(search.workers, search.executor, None if states else asked["progress"]),
     )
 
 
@@ -436,60 +379,12 @@ def _find_moves(
     return opened if candidates is None else thin(opened, candidates)
 
 
-def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
-    """Return where a build begins or ends."""
-    text = str(given)
-    try:
-        if given is None or isinstance(given, Site | _Place):
-            return _Place(given) if isinstance(given, Site) else given or _Place()
-        if text.isdecimal():
-            site = Site(int(text), (None,) * len(scene.robots) if name == "begin" else None)
-            site.holds(scene)
-            return _Place(site)
-        file, _, step = text.rpartition(":")
-        if file and step.isdecimal():
-            return _of_plan(scene, Path(file), int(step))
-        raise StepError(f"give {FORMS}")
-    except StepError as error:
-        raise StepError(f"{name} {text}: {error}") from None
-
-
-def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
-    """Return the place of a plan after a step; robots that it does not list hold nothing."""
-    file = path / "plan.csv" if path.is_dir() else path
-    columns = read_text(file).partition("\n")[0].split(",")
-    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
-    steps = read_plan(scene.with_robots(*known) if known else scene, file)
-    where = [known.index(robot) if robot in known else None for robot in scene.robots]
-    if known != [*scene.robots]:
-        steps = tuple(
-            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
-        )
-    done = tuple(each for each in steps if each.number <= step)
-    return _Place(Site.after(steps, step), done if steps[0].number == 1 else ())
-
-
-def _find_start(
-    scene: Scene, part: Part, stands: Standing | Mortar | str | None
-) -> tuple[Scene, _Place]:
-    """Return where a build begins after changes, and the scene in an order of those bricks."""
-    begin = _find_place(part.begin, "begin", scene)
-    if wrong := [name for name in part.missing if not str(name).isdecimal()]:
-        raise StepError(f"missing {wrong[0]}: give the number of a brick")
-    if begin.site is None:
-        for name, gone in (("lost", part.lost), ("missing", part.missing)):
-            if gone:
-                said = "a build that goes on has changed; say where it begins"
-                raise StepError(f"{name} {gone[0]}: {said}")
-        return scene, begin
-    if begin.done and isinstance(stands, Standing) and stands.curing is not None:
-        waits = offered("mortar_waits")(build_network(scene), stands)
-        times = offered("step_times")(scene, begin.done, waits)
-        ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
-        ages = tuple(times[-1].end - end for end in ends)
-        begin = replace(begin, site=replace(begin.site, ages=ages))
-    if not (part.lost or part.missing):
-        return scene, begin
-    assert begin.site is not None
-    scene, site = without(scene, begin.site, part.lost, [*map(int, part.missing)])
-    return scene, _Place(site)
+def _with_ages(scene: Scene, begin: _Place, stands: Standing | Mortar | str | None) -> Site | None:
+    """Return where a build begins, with the ages of its mortar if it cures, s."""
+    cures = isinstance(stands, Standing) and stands.curing is not None
+    if begin.site is None or not begin.done or not cures:
+        return begin.site
+    waits = offered("mortar_waits")(build_network(scene), stands)
+    times = offered("step_times")(scene, begin.done, waits)
+    ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
+    return replace(begin.site, ages=tuple(times[-1].end - end for end in ends))

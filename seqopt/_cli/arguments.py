@@ -34,9 +34,12 @@ seqopt --help names all commands, seqopt COMMAND --help what each can do.
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-LEADS = {"limit": "limits", "option": "options"}  # parameters, by the words that messages have
-LEADS |= {"to": "to", "vary": "vary"}
-LEADS |= {n: n for n in ("begin", "criterion", "direction", "engine", "lost", "missing", "rules")}
+LEADS = {"limit": "limits", "option": "options", "round": "rounding"}
+NAMES = "begin criterion curing direction durations engine grips holds lost measured missing"
+NAMES += " mortar payload props reference robots rules stands to vary"
+LEADS |= {name: name for name in NAMES.split()}
+"""Parameters, by the words that messages begin with."""
+LEAD = re.compile(r"\w+")
 GIVEN = re.compile(r"\b(\w+)='([\w-]+)'")
 
 
@@ -130,9 +133,9 @@ class Request:
     def spoken(self, message: str) -> str:
         """Return a message about parameters of Python as one about options."""
         options = SIGNATURES.signature_of(find_command(self.name).load()).options
-        lead, space, rest = message.partition(" ")
-        if LEADS.get(lead) in options:
-            message = options[LEADS[lead]].flag + space + rest
+        lead = LEAD.match(message)
+        if lead is not None and LEADS.get(lead[0]) in options:
+            message = options[LEADS[lead[0]]].flag + message[lead.end() :]
 
         def given(found: re.Match[str]) -> str:
             return f"{options[found[1]].flag} {found[2]}" if found[1] in options else found[0]

@@ -3,66 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from seqopt._files import csv_text, require_apart, require_folder, write_folder, write_text
-from seqopt._later import Later
 from seqopt._showing import PAGE
-from seqopt.plan.build import ShownBuild
-from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE
 from seqopt.work.progress import Tell
 
-CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
-FILES = Later("seqopt.report._style")  # likewise
-TASKS = Later("seqopt.exchange._tasks")  # 13 ms, where files are written
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
-
-
-def figure_notes(written: object = True) -> tuple[str, ...]:  # noqa: FBT002  # what is written
-    """Return a note that figures are left out if matplotlib is not installed."""
-    if not written or find_spec("matplotlib") is not None:
-        return ()
-    return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
-
-
-def picture(name: str, draw: Callable[[Any], Any]) -> dict[str, bytes]:
-    """Return files of a picture by name, empty without matplotlib; ``draw`` takes the charts."""
-    if figure_notes():
-        return {}
-    files: dict[str, bytes] = FILES.picture_files(name, draw(CHARTS))
-    return files
-
-
-def plan_files(plan: Plan) -> dict[str, bytes | str]:
-    """Return tables and tasks of a plan by file name."""
-    tables = {"plan": plan.responses()}
-    if plan.graph.standing is not None and not plan.graph.candidates:
-        tables["stability"] = plan.stability()
-    if plan.engine.network.scene.props:
-        tables["props"] = plan.props()
-    if plan.makespan is not None:
-        tables["times"] = plan.times()
-    files: dict[str, bytes | str] = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
-    if plan.makespan is not None:
-        files |= picture("times", lambda _: plan.gantt())
-    return {**files, **task_files(plan)}
-
-
-def task_files(plan: ShownBuild) -> dict[str, str]:
-    """Return the tasks of robots for their programming, by file name."""
-    scene, arms = plan.engine.network.scene, getattr(plan, "arms", None)
-    if arms is None:
-        tasks = [*TASKS.tasks_in_postures(scene, plan.steps)]
-    else:
-        tasks = [*TASKS.plan_tasks(scene, plan.steps, postures=arms.postures)]
-    return {"tasks.json": TASKS.tasks_json(scene, tasks), "tasks.csv": TASKS.tasks_csv(tasks)}
 
 
 def put_table(

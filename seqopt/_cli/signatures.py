@@ -3,7 +3,7 @@
 A command is a function. Its parameters are its options: of a type and a default, with the help text
 that its docstring has for them. A parameter that takes a value made of several words is spread: the
 fields of the value are options (`seqopt._cli.words`). A parameter that is a `Call` has the options
-of another function, as that of an analysis: all, or those that are named.
+of another function, as that of an analysis.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PRINTED = {
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR", "INSTANCE", "SOLUTION")
 NAMED = re.compile(r"(\w+(?:, \w+)*) :(?: (\S.*))?")  # begins what a docstring says of parameters
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
-SAME = re.compile(r"As of `(\w+)`")
+SAME = re.compile(r"As of `([\w.]+)`")
 WORD = re.compile(r"``(\w+)(?:=\"?([^`\"]*)\"?)?``")  # a parameter in a docstring, with its value
 
 
@@ -138,7 +138,6 @@ class Spread(NamedTuple):
     names: Sequence[str]
     default: Any
     called: bool  # whether it is a `Call`
-    whole: bool  # whether the function takes it as it is, not what it stands for
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,8 @@ class Signature:
 
     def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return values of parameters, of values or words for options; of none the default."""
-        values = {name: each for name, each in given.items() if each not in (None, [], ())}
+        values = {n: o.more["usual"] for n, o in self.options.items() if "usual" in o.more}
+        values |= {name: each for name, each in given.items() if each not in (None, [], ())}
         values |= {
             n: self.options[n].parse(each) for n, each in values.items() if n in self.options
         }
@@ -159,11 +159,10 @@ class Signature:
             words = {n: values.pop(n) for n in each.names if n in values}
             if each.called:
                 values[name] = Call(each.made_by, words)
-            elif type(words.get(name)) is each.made_by or not (words or each.default is MISSING):
-                values |= words
-            else:
-                made = each.made_by(**words)
-                values[name] = made if each.whole or not hasattr(made, "parse") else made.parse()
+            elif not isinstance(words.get(name, ""), str | Path):
+                values |= words  # a value
+            elif name not in values and (words or each.default is MISSING):
+                values[name] = each.made_by(**words)
         taken = inspect.signature(self.function).parameters  # not all tell how far they are
         return {name: each for name, each in values.items() if name in taken}
 
@@ -176,7 +175,8 @@ class Signature:
         for name, (value, text) in own.items():
             same = SAME.match(text)
             if same and name in self.options:
-                text = signature_of(COMMANDS[same[1]].load()).texts()[name][1]  # noqa: PLW2901
+                like = COMMANDS.get(same[1], COMMANDS["optimize"])
+                text = signature_of(like.load()).texts()[name][1]  # noqa: PLW2901
             default = self.options[name].default if name in self.options else ""
             out[name] = value, text.replace("{default}", str(default))
         return out
@@ -255,15 +255,13 @@ def signature_of(function: Callable[..., Any]) -> Signature:
             if each.name != "progress":
                 options[each.name] = option
             continue
-        known, some = signature_of(maker).options, option.more.get("of")
-        names = [
-            n for n in known if (n not in own or n == each.name if some is None else n in some)
-        ]
+        known = signature_of(maker).options
+        names = [n for n in known if n not in own or n == each.name]
         options |= {n: replace(known[n], place=bool(called) and n == "scene") for n in names}
         if each.name in names:
             first = known[each.name].default if default is MISSING else default
             options[each.name] = replace(known[each.name], default=first, place=option.place)
-        spread[each.name] = Spread(maker, names, default, bool(called), maker in option.kinds)
+        spread[each.name] = Spread(maker, names, default, bool(called))
     return Signature(function, options, spread)
 
 
@@ -287,6 +285,7 @@ def _option(parameter: inspect.Parameter, default: Any, *, foreign: bool) -> Opt
             kinds.add(get_origin(kind) or kind)
     if repr(default) == "<factory>" or isinstance(default, list | dict):
         default = ()
+    default = more.get("usual", MISSING) if default is MISSING else default
     place = parameter.kind is not parameter.KEYWORD_ONLY
     return Option(parameter.name, frozenset(kinds), default, place, more)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,8 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
+from seqopt.sequence.part import find_scene
+from seqopt.work.progress import Tell
 
 if TYPE_CHECKING:
     from seqopt.arms._postures import PostureTable
@@ -134,16 +137,39 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
     return choose(whose, usable, table.collide, together, len(table.robots))
 
 
-def reach_table(scene: Scene) -> pd.DataFrame:
+def reach(
+    scene: Scene | Path | str, *, cache: Path | str | None = None, progress: Tell | None = None
+) -> pd.DataFrame:
     """Return which robot reaches which node, with how many postures, and how long.
 
-    A row for every robot with an arm and every node, in build order: ``robot``, ``brick``,
-    ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself nor
-    the brick that it grips; ``from_bricks``, with how many bricks that of the node is placed;
-    ``to_bricks``, up to how many a posture hits none of them, zero if there is none; ``clear``, how
-    many of the kept postures hit no brick of the finished structure; ``why``, what is in the way
-    where ``to_bricks`` is zero. Raises `SceneError` if no robot has an arm.
+    Parameters
+    ----------
+    scene, cache, progress : optional
+        As of `optimize`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for every robot with an arm and every node, in build order: ``robot``, ``brick``,
+        ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself
+        nor the brick that it grips; ``from_bricks``, with how many bricks that of the node is
+        placed; ``to_bricks``, up to how many a posture hits none of them, zero if there is none;
+        ``clear``, how many of the kept postures hit no brick of the finished structure; ``why``,
+        what is in the way where ``to_bricks`` is zero.
+
+    Raises
+    ------
+    SceneError
+        If no robot has an arm.
+
+    Examples
+    --------
+    >>> reach("wall:columns=2,courses=2")
+    Traceback (most recent call last):
+    seqopt.errors.SceneError: scene wall 2 x 2: no robot has an arm; give one in its scene file
     """
+    scene = find_scene(scene)
+    find_postures(scene, cache, progress)
     table, allowed = find_table(scene), permits(scene)
     rows = []
     for r, name in enumerate(table.robots):

@@ -110,7 +110,7 @@ def _soft_models(arms: Iterable[tuple[str, Arm | None]]) -> dict[str, ArmModel]:
 
 _VERSION = 3  # of what is computed: tables of another one are not taken
 _DAMAGED = (
-    *(OSError, ValueError, TypeError, EOFError, SyntaxError),
+    *(OSError, ValueError, TypeError, EOFError, SyntaxError, AttributeError, RuntimeError),
     *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
 )  # what reading broken bytes raises
 _NAMES = ("robots", "nodes", "bricks", "links")

@@ -83,22 +83,24 @@ def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
     return Mortar(friction=friction, tensile_strength=strength, cohesion=strength * (1 + friction))
 
 
-def find_mortar(mortar: Mortar | str) -> Mortar:
-    """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa."""
+def find_mortar(mortar: Mortar | str, where: str = "mortar") -> Mortar:
+    """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa.
+
+    ``where``: what is given, for messages.
+    """
     if isinstance(mortar, Mortar):
         return mortar
     if str(mortar) in MORTARS:
         return MORTARS[str(mortar)]
     name, _, strength = str(mortar).partition("=")
     try:
-        pascal = float(strength if name == "bond" else "")
+        return bond_mortar(float(strength if name == "bond" else ""))
     except ValueError:
-        hint = did_you_mean(name, (*MORTARS, "bond"))
+        hint, known = did_you_mean(name, (*MORTARS, "bond")), ", ".join(MORTARS)
+        text = short(mortar)[1:-1] if isinstance(mortar, str) else short(mortar)
         raise SceneError(
-            f"mortar {short(mortar)}{hint}: give a Mortar, or one of {', '.join(MORTARS)}, "
-            "or bond=STRENGTH (Pa)"
+            f"{where} {text}{hint}: give {known}, or bond=STRENGTH (Pa), zero or more"
         ) from None
-    return bond_mortar(pascal)
 
 
 def _mortar_name(mortar: Mortar) -> str:

@@ -224,6 +224,23 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     return made
 
 
+def find_engine(network: Network, engine: str | None, mortar: Mortar | str | None) -> Engine:
+    """Return an engine by name; by default the simplest level of `DEFAULT` that fits the scene.
+
+    With a mortar of its own an engine is asked where joints open: set by set.
+    """
+    found = make_engine(engine or DEFAULT, network, mortar)
+    return simplest(found) if engine is None and mortar is None else found
+
+
+def engine_mortar(
+    engine: str | None, mortar: Mortar | str | None, *, verdicts: bool
+) -> Mortar | None:
+    """Return the mortar that an engine is asked with; that of ``verdicts`` may be theirs alone."""
+    own = None if mortar is None else find_mortar(mortar)
+    return None if verdicts and engine not in LIMITED else own
+
+
 def simplest(engine: Engine) -> Engine:
     """Return the engine that answers all grip sets of a problem: of `auto` the level of its scene.
 

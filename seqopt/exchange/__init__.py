@@ -13,7 +13,7 @@ needed:
 >>> print(scene.provenance.splitlines()[1])
 a table of boxes: no faces
 
-Plans are written as tasks of robots, and for COMPAS (`export_plan`).
+Plans are written as tasks of robots, and for COMPAS (`export`).
 """
 
 from typing import TYPE_CHECKING
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from seqopt.exchange._content import Content, FileBlock, Given
     from seqopt.exchange._formats import Format
     from seqopt.exchange._tasks import plan_tasks
-    from seqopt.exchange.exports import export_plan
+    from seqopt.exchange.exports import export
     from seqopt.exchange.imports import import_scene
 
-__all__ = ["Content", "FileBlock", "Format", "Given", "export_plan", "import_scene", "plan_tasks"]
+__all__ = ["Content", "FileBlock", "Format", "Given", "export", "import_scene", "plan_tasks"]
 __getattr__, __dir__ = later(
     __name__,
     {
@@ -35,7 +35,7 @@ __getattr__, __dir__ = later(
         "FileBlock": "_content",
         "Format": "_formats",
         "Given": "_content",
-        "export_plan": "exports",
+        "export": "exports",
         "import_scene": "imports",
         "plan_tasks": "_tasks",
     },

@@ -63,7 +63,7 @@ class Format(Part):
         Takes a scene, the steps of a plan, and by name what the format ``takes``; returns the text
         of a file.
     takes : tuple of str
-        Of ``source`` and ``distance``, see `export_plan`.
+        Of ``source`` and ``distance``, see `export`.
     lost : tuple of str
         What a scene is without, once it was written and read again.
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import chain
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 nx = Later("networkx")  # 120 ms, where connectivity is asked
+WORDS = Later("seqopt.scene._words")  # where words are given
 
 _Part = TypeVar("_Part")
 _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
@@ -284,24 +286,37 @@ class Scene(Shown):
         return replace(self, robots=robots)
 
     def with_grips(
-        self, stiffness: float | Vector | None, rotational_stiffness: float | Vector | None = None
+        self,
+        stiffness: float | Vector | str | None,
+        rotational_stiffness: float | Vector | None = None,
     ) -> Scene:
         """Return the same scene with grips of all robots of a given stiffness.
 
         Joints of arms count as rigid then: what is given includes them.
 
         ``stiffness``, ``rotational_stiffness``: as of `Robot`; None for rigid grips, and for such
-        as let their nodes turn.
+        as let their nodes turn; or both in words, as ``"1e6x1e6x5e5,turning=2e4"``.
         """
+        given, turn = stiffness, rotational_stiffness
+        if isinstance(given, str):
+            given, turn = WORDS.parse_grips(given)
         bare = [(r, r.arm and replace(r.arm, joint_stiffness=())) for r in self.robots]
-        turn = rotational_stiffness
         return self.with_robots(
-            *(replace(r, arm=a, stiffness=stiffness, rotational_stiffness=turn) for r, a in bare)
+            *(replace(r, arm=a, stiffness=given, rotational_stiffness=turn) for r, a in bare)
         )
 
-    def with_props(self, *props: Prop) -> Scene:
-        """Return the same scene with other props, ``*props``: all of the new scene."""
-        return replace(self, props=props)
+    def with_payloads(self, *payloads: float | str) -> Scene:
+        """Return the same scene with payloads of robots, N: of all, or as ``"rob1=250"`` of one."""
+        return self.with_robots(*WORDS.parse_payloads(self.robots, payloads))
+
+    def with_props(self, *props: Prop | str) -> Scene:
+        """Return the same scene with other props: all of the new scene.
+
+        ``*props``: values, or words, as ``"13,27:1e6,push,capacity=300"`` or ``"every:1e6"``.
+        """
+        how = self.up, self.with_centering
+        each = (WORDS.parse_props(p, *how) if isinstance(p, str) else (p,) for p in props)
+        return replace(self, props=(*chain.from_iterable(each),))
 
     def with_centering(self, stiffness: float | Vector | None = None) -> Scene:
         """Return the same scene with a prop at every brick, as centering has, and no others.

@@ -117,7 +117,7 @@ def _vector(text: str) -> Vector:
 
 
 ORDER = "order"  # of any kind: in which bricks are placed
-_WHOLE, _NUMBER = (int, "it as 12"), (float, "it as 0.5")
+_WHOLE, _NUMBER = (int, "it as 12"), (float, "a number alone, as 0.5")
 _READ: dict[Any, Reader] = {
     int: _WHOLE,
     int | None: _WHOLE,
@@ -262,13 +262,19 @@ def _read(kind: type, given: Any, where: str) -> Any:
             own[name] = [_read(_KINDS[name], part, f"{inner}[{i}]") for i, part in each]
         elif name == "reach" and isinstance(value, dict):
             reach = _REACHES[one_of(f"{inner}: kind", value.get("kind"), _REACHES)]
-            own[name] = _read(reach, {k: v for k, v in value.items() if k != "kind"}, inner)
+            rest = {k: v for k, v in value.items() if k != "kind"}
+            own[name] = _read_within(reach, rest, name, where)
         elif name in _WITHIN and value is not None:
-            try:
-                own[name] = _read(_WITHIN[name], value, name)
-            except SceneError as error:
-                raise SceneError(f"{where}: {error}") from error
+            own[name] = _read_within(_WITHIN[name], value, name, where)
     return kind(**own)
+
+
+def _read_within(kind: type, given: Any, name: str, where: str) -> Any:
+    """Return a part of one, whose errors say where it is."""
+    try:
+        return _read(kind, given, name)
+    except SceneError as error:
+        raise SceneError(f"{where}: {error}") from error
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

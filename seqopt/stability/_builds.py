@@ -12,7 +12,15 @@ from itertools import chain
 import numpy as np
 
 from seqopt.contact.faces import PartialAssemblies
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong, _with_mortar
+from seqopt.contact.mortar import (
+    DRY,
+    EPOXY,
+    Mortar,
+    _is_as_strong,
+    _mortar_name,
+    _with_mortar,
+    find_mortar,
+)
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -154,6 +162,24 @@ class BuildProver:
                 first = found.first_block, found.first_contact
                 return BuildVerdicts(name, verdicts, step.number, *first, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
+
+
+def find_prover(
+    network: Network,
+    mortar: Mortar | str | None,
+    progress: Tell | None,
+    *,
+    asks: bool = True,
+    own: Mortar | None = None,
+) -> BuildProver:
+    """Return the prover of verdicts, dry and with a mortar, by default epoxy; or of none.
+
+    ``own``: what a mortar's name stands for, if not what it usually does.
+    """
+    own = own or find_mortar(mortar or "epoxy")
+    name = mortar if isinstance(mortar, str) else _mortar_name(own)
+    shown = {"dry": Mortar(friction=own.friction), name: own}
+    return BuildProver(network, shown if asks else {}, progress)
 
 
 def _state(step: Step) -> _State:

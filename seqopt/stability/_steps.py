@@ -52,17 +52,9 @@ def assess_steps(
 
     Parameters
     ----------
-    network : Network or Scene
-    steps : sequence of Step
-    mortar : Mortar or str
-        The mortar of all joints, or its name.
-    margins : collection of str, optional
-        Of ``bond``, ``friction``, ``tilt`` and ``payload``, or ``all``; others are NaN. Each takes
-        several times as long as a verdict.
-    progress : callable, optional
-        Called with a `seqopt.work.Stage`, step by step.
-    workers : int or concurrent.futures.Executor, optional
-        Processes to share the steps among, or any executor, which the caller ends.
+    network, steps, mortar, margins, progress, workers
+        As of `seqopt.assess`: a network or scene, and steps that need not follow each other. Any
+        executor may share the steps, which the caller ends.
 
     Returns
     -------
@@ -70,18 +62,9 @@ def assess_steps(
 
     Raises
     ------
-    SceneError
-        If bricks that share a joint do not touch, or there is no such margin.
-    ProblemError
-        If there cannot be so many workers.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> steps = seqopt.sequential(network)[:2]
-    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
-    ['stands', 'stands']
+    SceneError, ProblemError
+        If bricks that share a joint do not touch, there is no such margin, or cannot be so many
+        workers.
     """
     network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
     if "overlaps" not in network.derived:

@@ -1,17 +1,24 @@
 """How long builds take: robots that prepare, mortar that cures, and the proof of makespans.
 
-The room hands out nothing: others find what it offers in `seqopt._registry`. Robots prepare at the
-same time, and act one after the other:
+Others find what the room offers in `seqopt._registry`. Robots prepare at the same time, and act one
+after the other:
 
 >>> import seqopt
->>> from seqopt.times._steps import step_times
+>>> from seqopt.times import times
 >>> words = "fetch=30,place=20,approach=10,grip=5,release=5"
->>> scene = seqopt.load_scene("arch25").with_durations(words)
->>> times = step_times(scene, seqopt.sequential(scene))
->>> times[1].ready, times[1].start, times[1].end  # s; the second brick waits for the first
-(30.0, 50.0, 70.0)
->>> times[-1].end
+>>> build = times(seqopt.load_scene("arch25").with_durations(words), "sequential")
+>>> build.times().loc[1, ["ready_s", "start_s", "end_s"]].tolist()  # the second brick waits
+[30.0, 50.0, 70.0]
+>>> build.makespan
 1340.0
 """
 
-__all__: list[str] = []
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+
+if TYPE_CHECKING:
+    from seqopt.times._build import times
+
+__all__ = ["times"]
+__getattr__, __dir__ = later(__name__, {"times": "_build"})

@@ -9,18 +9,20 @@ from typing import Annotated, Any
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.inputs import Sequenced, read_steps
+from seqopt._cli.inputs import read_steps
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import Built, File, named, parse_mortar
+from seqopt._cli.words import File, named
 from seqopt._files import csv_text
 from seqopt._later import Later
-from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar
+from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
+from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words
+from seqopt.sequence.part import find_scene, plan_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
@@ -28,18 +30,15 @@ from seqopt.stability.failure_map import AXES, failure_map
 from seqopt.work.progress import Tell, with_progress
 
 MAP = Later("seqopt.report._failures")  # 24 ms, of pages
+FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written
 STEEPEST = 45.0  # degrees
 
 
-def assess(  # noqa: PLR0913  # every option is a parameter
-    asked: Annotated[Call, ("call", read_steps)],
+def run(
+    asked: Annotated[Call, ("call", assess)],
     *,
-    mortar: str | None = None,
-    friction: float | None = None,
-    margins: str | None = None,
     map: Annotated[str | None, ("value", "AXIS")] = None,  # noqa: A002  # the option's name
     holds: str = "dry,epoxy",
-    workers: int = 1,
     out: File = None,
     progress: Tell,
 ) -> Answer:
@@ -51,14 +50,6 @@ def assess(  # noqa: PLR0913  # every option is a parameter
 
     Parameters
     ----------
-    mortar : str, optional
-        What is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), or
-        bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status).
-    friction : float, optional
-        Coefficient of friction, in place of the mortar's own.
-    margins : str, optional
-        Margins beside the verdicts, or all, with commas between them; each takes several times as
-        long.
     map : str, optional
         Map where builds fail, over what holds their joints and over friction or tilt (degrees),
         with values of your own as tilt=0,2,5; of the fixed methods, a loop and a free schedule, or
@@ -66,8 +57,6 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     holds : str, optional
         With ``map``: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, with commas
         between them (default: {default}).
-    workers : int, optional
-        Processes to share the steps among (default: {default}).
     out : pathlib.Path, optional
         CSV file to write (default: standard output); with ``map`` a folder.
 
@@ -77,26 +66,28 @@ def assess(  # noqa: PLR0913  # every option is a parameter
     $ seqopt assess arch25 --method sequential --mortar dry --margins bond,tilt
     $ seqopt assess arch:span=2,rise=0.8 --map friction --out map
     """
-    built: Built = asked.values()["scene"]
-    output = Output(out, built.scene, asked.words.get("plan"))
+    words = {name: word for name, word in asked.words.items() if name != "mortar"}
+    output, mortar = Output(out, words.get("scene"), words.get("plan")), asked.words.get("mortar")
     if map is not None:
-        known = {"method", "plan"} & {*asked.words} or built.folder
-        return _map(asked, map, named(holds), output, progress, known=bool(known))
+        return _map(words, map, named(holds), output, progress)
     output.keep_apart(out)
-    own = parse_mortar(mortar or "epoxy", "--mortar")
-    own = own if friction is None else replace(own, friction=friction)
-    shown = (own,) if mortar else (Mortar(friction=own.friction), own)  # the last one decides
+    own = find_mortar(mortar or "epoxy")
+    (given, taken), rows = read_steps(words, progress), list[dict[str, Any]]()
+    values = asked.values(scene=given)
+    friction = own.friction if values["friction"] is None else values["friction"]
+    own = replace(own, friction=friction)
+    shown = (own,) if mortar else (Mortar(friction=friction), own)  # the last one decides
     mortars = {_mortar_name(each): each for each in shown}
-    given, rows = asked(progress=progress), list[dict[str, Any]]()
-    wanted = find_margins(margins or ()), range(1, len(given.steps) + 1)
-    for name, own in mortars.items():
-        told = with_progress(f"assessing steps, {_with_mortar(name)}", given.steps, progress)
-        results = each_stability(given.network, given.steps, own, *wanted, (None, workers))
-        pairs = zip(told, results, strict=True)
+    wanted, shared = find_margins(values["margins"] or ()), (None, values["workers"])
+    network, steps = given.network, given.steps
+    for name, each in mortars.items():
+        told = with_progress(f"assessing steps, {_with_mortar(name)}", steps, progress)
+        found = each_stability(network, steps, each, wanted, shared=shared)
+        pairs = zip(told, found, strict=True)
         rows += [{"mortar": name, **stability_row(step, result)} for step, result in pairs]
-    carried = remarks.carrying_notes(given.scene, given.steps)
-    notes = (*given.notes, *remarks.settlement_notes(given.scene), *carried)
-    return replace(_answer(output, mortars, rows), scene=given.scene, notes=notes)
+    scene, carried = network.scene, remarks.carrying_notes(network.scene, steps)
+    notes = (*taken, *remarks.settlement_notes(scene), *carried)
+    return replace(_answer(output, mortars, rows), scene=scene, notes=notes)
 
 
 def _answer(
@@ -120,29 +111,26 @@ def _answer(
 
 
 def _map(
-    asked: Call, over: str, holds: Sequence[str], output: Output, tell: Tell, *, known: bool
+    words: Mapping[str, Any], over: str, holds: Sequence[str], output: Output, tell: Tell
 ) -> Answer:
-    """Return the failure map of builds over an axis and the mortar of joints.
-
-    ``known``: whether one build is named.
-    """
+    """Return the failure map of builds over an axis and the mortar of joints."""
     axis, values = _axis(over)
     for name in holds:
-        parse_mortar(name, "--holds")
+        find_mortar(name, "holds")
     output.require()
     builds: Mapping[str, Sequence[Step]]
     notes: Sequence[str]
-    if known:
-        given: Sequenced = asked(progress=tell)
-        scene, builds, notes = given.scene, {given.name: given.steps}, given.notes
+    if {"method", "plan"} & {*words} or plan_folder(words.get("scene")):
+        given, notes = read_steps(words, tell)
+        scene, builds = given.network.scene, {given.title: given.steps}
     else:
-        scene = asked.values()["scene"].parse(asked.words.get("robots"))
+        scene = find_scene(Call(assess, words).values()["scene"], robots=words.get("robots"))
         builds, notes = MAP.usual_builds(scene, tell)
     found = failure_map(scene, builds, holds, axis, values, tell)
 
     def files() -> dict[str, bytes | str]:
         tables = {"map.csv": csv_text(found.cases), "map_steps.csv": csv_text(found.steps)}
-        picture = outputs.picture("map", lambda charts: charts.failure_figure(found))
+        picture = FOLDERS.picture_files("map", lambda charts: charts.failure_figure(found))
         return {**tables, **picture}
 
     written = output.write(tell, files)
@@ -155,7 +143,7 @@ def _map(
         "\n\n".join([*blocks, wrapped(where)]),
         written=written,
         scene=scene,
-        notes=(*notes, *outputs.figure_notes(written)),
+        notes=(*notes, *(FOLDERS.figure_notes() if written else ())),
         status=Status.DOES_NOT_HOLD if found.cases["fall"].any() else Status.DONE,
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 from seqopt._cli.answer import Answer
@@ -13,33 +12,18 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt._files import write_text
 from seqopt.arms._kept import arm_faults
-from seqopt.exchange._formats import formats, writable
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange._formats import formats
+from seqopt.exchange.exports import export
 from seqopt.work.progress import Tell
 
 
-def export(
-    asked: Annotated[Call, ("call", read_steps)],
-    *,
-    format: Annotated[str, ("choices", writable)] = "tasks",  # noqa: A002  # the option's name
-    source: Path | None = None,
-    distance: Annotated[float | None, ("value", "M")] = None,
-    out: File = None,
-    progress: Tell,
-) -> Answer:
+def run(asked: Annotated[Call, ("call", export)], *, out: File = None, progress: Tell) -> Answer:
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
     It says what each robot does and where, or is the assembly with its plan.
 
     Parameters
     ----------
-    format : str, optional
-        What to write (default: {default}): {choices}.
-    source : pathlib.Path, optional
-        With compas_assembly: the assembly that was imported, to write the plan into.
-    distance : float, optional
-        With tasks or tasks_csv: from a grip to where the tool comes from and goes to, m (default:
-        the longest side of each block).
     out : pathlib.Path, optional
         File to write (default: standard output).
 
@@ -47,15 +31,16 @@ def export(
     --------
     $ seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
-    Output(out, asked.words.get("scene"), asked.words.get("plan"), source).keep_apart(out)
-    given = asked(progress=progress)
-    scene, steps, notes, form = given.scene, given.steps, given.notes, formats()[format]
+    words, format = asked.words, asked.words.get("format", "tasks")  # noqa: A001
+    Output(out, words.get("scene"), words.get("plan"), words.get("source")).keep_apart(out)
+    (given, notes), form = read_steps(words, progress), formats()[format]
+    scene, steps = given.network.scene, given.steps
     if "distance" in form.takes and scene.has_arms:
-        if trouble := posture_trouble(scene, asked.words.get("cache"), progress):
+        if trouble := posture_trouble(scene, words.get("cache"), progress):
             notes = (*notes, f"arms: grips are proposals without postures; {trouble}")
         else:
             notes = (*notes, *(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)))
-    text = export_plan(scene, steps, format, source, distance)
+    text = asked(scene=scene, steps=steps, progress=progress)
     said, lost = f"{len(steps)} steps", form.lost
     if lost:
         plan = "" if "steps" in lost else f" and {said}"

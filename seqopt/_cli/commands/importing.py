@@ -19,14 +19,12 @@ from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
 from seqopt.work.progress import Tell
 
-ASKED = ("name", "unit", "up", "density", "robots", "gap", "accept_overlaps")
-
 
 def run(
     file: Path,
     *,
     out: Annotated[Path, ("value", "FILE")],
-    given: Annotated[Call, ("call", Given), ("of", ASKED)],
+    given: Annotated[Call, ("call", Given)],
     format: Annotated[str | None, ("choices", readable)] = None,  # noqa: A002  # the option's name
     supports: Annotated[str | None, ("value", "KEY,KEY")] = None,
     stiffness: Annotated[str | None, ("value", "NORMAL,TANGENTIAL")] = None,

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.inputs import mortar_of_engine
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
+from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.instances._files import WRITERS, save_instance
@@ -25,7 +25,7 @@ from seqopt.workflow import optimize, pose_build
 OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")
 
 
-def instance(
+def run(
     asked: Annotated[Call, ("call", optimize)],
     *,
     below: Annotated[float, ("value", "VALUE")] = inf,
@@ -57,7 +57,7 @@ def instance(
     words, formulation = asked.words, asked.words.get("formulation")
     if out and out.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {out}: give a name with {', '.join(WRITERS)}, or a folder")
-    mortar = mortar_of_engine(words.get("engine"), words.get("mortar"), verdicts=True)
+    mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=True)
     clock = Clock(words.get("time_limit", inf))
     with clock.needed("posing the problem"):
         problem = pose_build(asked.values(mortar=mortar, progress=progress))

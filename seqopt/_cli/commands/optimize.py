@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from math import isfinite
 from typing import Annotated, Any
 
-import pandas as pd
-
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.inputs import find_prover, mortar_of_engine
 from seqopt._cli.outputs import ALWAYS, Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
-from seqopt._files import csv_text
 from seqopt._later import Later
-from seqopt._showing import PAGE
+from seqopt.engines.registry import engine_mortar
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
@@ -27,14 +22,13 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
-from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import _idle_note
-from seqopt.stability._builds import BuildProver, BuildVerdicts
+from seqopt.stability._builds import BuildProver, BuildVerdicts, find_prover
 from seqopt.study.published import paper_models
 from seqopt.work.progress import Tell
 from seqopt.workflow import Robust, optimize
 
-PAGES = Later("seqopt.report._pages")  # 200 ms, where files are written
+FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
 ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
 SAMPLED = ("measure", "count", "seed", "vary")
@@ -73,29 +67,23 @@ def run(
     """
     output = Output(out, asked.words.get("scene"), asked.words.get("schedule"))
     output.require(*ALWAYS)
-    plan, prover = find(asked, progress, stability=stability)
-    return answered(plan, prover, output, asked.words, progress)
-
-
-def find(asked: Call, tell: Tell | None, *, stability: bool) -> tuple[Plan, BuildProver]:
-    """Choose every open grip of a build, or every step; return the prover of its verdicts too."""
     words = asked.words
-    mortar = mortar_of_engine(words.get("engine"), words.get("mortar"), verdicts=stability)
-    plan: Plan = asked(mortar=mortar, progress=tell)
-    shown = words.get("stands", words.get("mortar"))
-    network, standing = plan.engine.network, plan.standing
-    return plan, find_prover(network, shown, tell, asks=stability, stands=standing)
+    mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=stability)
+    plan: Plan = asked(mortar=mortar, progress=progress)
+    return answered(plan, output, {**words, "stability": stability}, progress)
 
 
-def answered(
-    plan: Plan, prover: BuildProver, output: Output, words: Mapping[str, Any], tell: Tell
-) -> Answer:
+def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -> Answer:
     """Write a plan, and return its answer; ``words``: that asked for it."""
+    shown, standing = words.get("stands", words.get("mortar")), plan.standing
+    held = None if standing is None else standing.mortar
+    network, asks = plan.engine.network, words["stability"]
+    prover = find_prover(network, shown, tell, asks=asks, own=held)
     scene = plan.engine.network.scene
-    tables = outputs.plan_files(plan) if output.path is not None else {}
+    tables = FOLDERS.plan_files(plan) if output.path is not None else {}
     verdicts = prover.of_builds({plan.title: plan.steps})
     report = partial(_report, plan, prover, tables, words)
-    written = output.write(tell, lambda: _files(plan, prover, report, tables))
+    written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
     early, over = plan.ended is End.INTERRUPTED, remarks.exceeded(scene, plan._columns)
     answer = Answer(
         {
@@ -128,33 +116,12 @@ def _report(
         drawn = {"robust": str(robust.measure), "scenarios": settings}
     verdicts = prover.of_builds({plan.title: plan.steps}).get(plan.title, ())
     pictures = sum(name.endswith((".png", ".svg")) for name in tables)
-    loop = plan.method == "three-robot" and plan.graph.candidates
-    counts = paper_models(plan.decisions.schedule) if loop else ()
+    counts = paper_models(_problem(plan).schedule) if plan.method == "three-robot" else ()
     return plan.summary() | {
         "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
         "stability": {v.mortar: v.facts() for v in verdicts},
         "spent_on_showing": {**prover.spent, "pictures": pictures},
         **drawn,
-    }
-
-
-def _files(
-    plan: Plan,
-    prover: BuildProver,
-    report: Callable[[], Mapping[str, object]],
-    tables: Mapping[str, bytes | str],
-) -> dict[str, bytes | str]:
-    """Return the files of a plan by name."""
-    names = ("seconds", "objective", "bound", "gap")
-    page = PAGES.plan_page(plan, prover)
-    trace = pd.DataFrame([[getattr(each, n) for n in names] for each in plan.trace], columns=names)
-    finite = json.loads(json.dumps(report()), parse_constant=lambda _: None)
-    return {
-        "summary.json": json.dumps(finite, indent=2) + "\n",
-        "scene.json": dump_scene(plan.engine.network.scene),
-        PAGE: page,
-        **({} if trace.empty else {"trace.csv": csv_text(trace)}),
-        **tables,
     }
 
 
@@ -166,12 +133,12 @@ def _lines(
     scenarios = len(_problem(plan).scenarios)
     if plan.order:
         value = f"{values_text(plan.objective)}, {plan.status}, {plan.order_bound_said}"
-    elif scenarios and plan.graph.candidates:
-        value += f" over {scenarios} scenarios ({plan.title})"
+    elif scenarios:
+        value += f" over {scenarios} scenarios ({_problem(plan).over})"
     outside = f"{OUTSIDE}: " * bool(plan.outside)
     yield f"{outside}{TEXT._headline(scene, plan._columns)}; {value}"
     counts = [f"{len(plan.steps)} steps"]
-    if not plan.graph.candidates:
+    if not plan.states.rules.moves:
         counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Annotated
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.outputs import Output
+from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import ARCH25, Built, Folder
+from seqopt._cli.words import Folder
 from seqopt._files import csv_text
-from seqopt.arms._permits import reach_described, reach_table
-from seqopt.arms.reach import find_postures
+from seqopt.arms._permits import reach, reach_described
 from seqopt.work.progress import Tell
 
 
-def reach(
-    scene: Built = ARCH25, *, cache: Path | None = None, progress: Tell, out: Folder = None
-) -> Answer:
+def run(asked: Annotated[Call, ("call", reach)], *, out: Folder = None, progress: Tell) -> Answer:
     """Say which arms reach which nodes, with how many postures, and up to how many bricks.
 
     Robots have arms in the scene file; the extra arms computes postures.
 
     Parameters
     ----------
-    scene, cache, progress : optional
-        As of `optimize`.
     out : pathlib.Path, optional
         Folder to write reach.csv to.
 
@@ -33,13 +29,12 @@ def reach(
     $ seqopt reach my.json --out reach
     $ seqopt reach my.json --cache postures --json
     """
-    found, output = scene.parse(), Output(out, scene.scene)
+    found, output = asked.values()["scene"], Output(out, asked.words.get("scene"))
     output.require()
     if not found.has_arms:
         said = f"no robot of {found.name} has an arm; seqopt scene says how far each reaches"
         return Answer({"reach": []}, wrapped(said), scene=found)
-    find_postures(found, cache, progress)
-    table = reach_table(found)
+    table = asked(scene=found, progress=progress)
     written = output.write(progress, lambda: {"reach.csv": csv_text(table)})
     hint = "--out DIR writes a row for every robot and node"
     lines = [*reach_described(found, table), f"written to {out}: reach.csv" if written else hint]

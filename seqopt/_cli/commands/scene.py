@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, scene_facts
 from seqopt._cli.outputs import Output
-from seqopt._cli.words import ARCH25, Built, File
+from seqopt._cli.signatures import Call
+from seqopt._cli.words import File
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
+from seqopt.sequence.part import find_scene
 from seqopt.work.progress import Tell, with_progress
 
 
 def run(
-    scene: Built = ARCH25,
+    asked: Annotated[Call, ("call", find_scene)],
     *,
     progress: Tell,
     list: bool = False,  # noqa: A002  # the option's name
@@ -32,8 +34,6 @@ def run(
 
     Parameters
     ----------
-    scene, progress : optional
-        As of `optimize`.
     list : bool, optional
         Name all built-in scenes, and the words that make others.
     export : pathlib.Path, optional
@@ -52,8 +52,8 @@ def run(
         listed = [f"{name}: {size}; {ABOUT[name]}" for name, size in sizes.items()]
         scenes = [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in every.items()]
         return Answer({"scenes": scenes, "kinds": KINDS}, "\n".join([*listed, *KINDS.values()]))
-    Output(export, scene.scene).keep_apart(export)
-    found = scene.parse()
+    Output(export, asked.words.get("scene")).keep_apart(export)
+    found = asked()
     facts = {**scene_facts(found), **_network_facts(build_network(found))}
     lines = [*_described(found, facts)]
     if export is not None:

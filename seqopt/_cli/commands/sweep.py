@@ -7,7 +7,6 @@ from functools import partial
 from itertools import product
 from typing import Annotated
 
-from seqopt._cli import outputs
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, Option, signature_of
@@ -15,6 +14,7 @@ from seqopt._cli.words import Folder
 from seqopt._files import csv_text, make_folder, write_folder
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan.plan import Plan
+from seqopt.report._folders import figure_notes, picture_files
 from seqopt.sweep import MOST, spread, sweep
 from seqopt.work.progress import Tell
 from seqopt.workflow import optimize
@@ -66,7 +66,7 @@ def run(
     written = () if output.path is None else (output.path,)
     differs = [name for name in next(iter(problems.values())) if table[name].nunique() > 1]
     if output.path is not None and differs and table.columns.str.endswith("_bound").any():
-        drawn = outputs.picture("sweep", lambda charts: charts.draw_sweep(table, differs))
+        drawn = picture_files("sweep", lambda charts: charts.draw_sweep(table, differs))
         write_folder(output.path, drawn)
     counts = ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items())
     text = f"{len(table)} problem{'s' * (len(table) > 1)}: {counts}"
@@ -77,7 +77,7 @@ def run(
         f"{text}; written to {out}" if written else "",
         data="" if written else csv_text(table),
         written=written,
-        notes=outputs.figure_notes() if written else (text,),
+        notes=figure_notes() if written else (text,),
         status=Status.NO_ANSWER if none else Status.DONE,
     )
 
