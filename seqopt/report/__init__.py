@@ -16,6 +16,13 @@ this page does not import.
 chain 9: 9 bricks, 3 robots
 """
 
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.report.comparison import Comparison, compare, format_comparison, largest, method_tables
 
-__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]
+if TYPE_CHECKING:
+    from seqopt.report._questions import report
+
+__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables", "report"]
+__getattr__, __dir__ = later(__name__, {"report": "_questions"})

@@ -156,7 +156,7 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
             from seqopt.report._style import picture_files  # noqa: PLC0415  # an extra
 
             tables.append((speed.sentence, picture_files("", draw(speed))[".png"]))
-        tables.append((title, speed.table))
+        tables.append((title, speed.shown))
     tables.append(_captioned("Methods and formulations; a click shows the build", shown))
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
     return _page(engine, builds, sentence, tables)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,18 +15,15 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
-from seqopt.graph.decision_costs import TINY
-from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import pose
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
-from seqopt.problem.problem import Aim
+from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
 from seqopt.report._regret._measure import measure_regret
 from seqopt.report._regret._table import RegretTable
-from seqopt.responses._choices import window_models
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
@@ -40,7 +37,7 @@ from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import PUBLISHED, published_about, published_choice
+from seqopt.study.published import PUBLISHED, published_about, published_plan
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
@@ -151,9 +148,7 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     if problem is not None and PUBLISHED in rows and not robots:
-        value = problem.sums.cost(published_choice(problem))
-        gap = (value - problem.sums.least(Aim.SUM)) / max(abs(value), TINY)
-        rows[PUBLISHED] |= {"problem": problem.schedule.method, "objective": value, "gap": gap}
+        rows[PUBLISHED] |= _published_row(problem, plans.values())
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # the first refusal says most
         raise type(refused[0])(f"{refused[0]}; {why[0]}")
@@ -165,7 +160,7 @@ def compare(
     notes += why
     criteria: dict[str, Criterion] = {}
     if problem is not None:
-        loop_name = problem.schedule.method
+        loop_name = problem.method
         notes += _idle_note(scene, f"{loop_name} loop", problem.schedule.steps)
         criteria[loop_name] = problem.criterion
     if free is not None:
@@ -210,15 +205,14 @@ def _table(
 
 def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
-) -> tuple[dict[str, Plan], Decisions | None, str]:
+) -> tuple[dict[str, Plan], Problem | None, str]:
     """Return the plans of all formulations and the problem of the loop, or why there is none."""
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
     plans: dict[str, Plan] = {}
 
-    def solved(schedule: Schedule, named: Mapping[str, Formulation]) -> Decisions:
-        means = Resources(progress=progress)
-        problem = pose_decisions(engine, schedule, criterion, resources=means)
+    def solved(schedule: Schedule, named: Mapping[str, Formulation]) -> Problem:
+        problem = pose(engine, schedule, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(named.items()):
             progress(Stage("comparing", (done + 1) / (len(named) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
@@ -254,6 +248,18 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
     return {"F_rob": float(np.nanmax(forces.to_numpy(float))), **worst}
 
 
+def _published_row(problem: Problem, plans: Iterable[Plan]) -> dict[str, object]:
+    """Return what the published plan is worth in a problem, and its gap to the best bound."""
+    from seqopt.judge._schedules import plan_values  # noqa: PLC0415  # with its proofs
+
+    loop = graph_of(problem, Aim.SUM)
+    (value,) = plan_values(loop, published_plan(problem.scene))
+    alike = (p for p in plans if (p.method, p.goals) == (loop.method, loop.names))
+    bound = max(p.certificate.bound for p in alike if p.certificate is not None)
+    gap = (value - bound) / (abs(value) or 1.0)
+    return {"problem": problem.method, "objective": value, "gap": gap}
+
+
 def _row(plan: Plan) -> dict[str, object]:
     """Return the objective of a plan, and the seconds that it alone took; for a free one all."""
     if plan.method == FREE:
@@ -263,8 +269,9 @@ def _row(plan: Plan) -> dict[str, object]:
     else:
         assert plan.certificate is not None  # asked for
         value, gap = plan.certificate.objective, plan.certificate.gap
-        windowed = plan.formulation.windowed == ()  # it needs fewer models
-        models = window_models(plan.decisions.schedule, plan.choice) if windowed else plan.models
+        models = plan.models
+        if plan.formulation.windowed == ():  # alone it needs fewer
+            models = solve(replace(plan.problem), plan.formulation, proof=False).models
         seconds = sum(plan.seconds[stage] for stage in ("compile", "solve", "verify"))
     about = {"problem": plan.method, "objective": value, "gap": gap, "models": models}
     return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}

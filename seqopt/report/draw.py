@@ -82,12 +82,6 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
 
     ``toward`` has unit vectors to the right, up and toward the viewer (3, 3). Boxes that hide each
     other in a circle, or share room, stand in the order of their middles.
-
-    >>> low, high = np.zeros((8, 3)), np.zeros((8, 3))
-    >>> low[4:, 0] = low[[2, 3, 6, 7], 1] = low[1::2, 2] = 1.0
-    >>> high = low + [0.0, 0.0, 1.0]
-    >>> _drawing_order(np.array([high, low]), np.eye(3))
-    [1, 0]
     """
     seen = corners @ toward.T
     low, high = seen[..., :2].min(axis=1), seen[..., :2].max(axis=1)
@@ -244,14 +238,8 @@ def draw_grips(
     for i, (x, y) in at.items():
         robot = scene.robots[i].name
         name = f"{robot} at {grips[i]}"
-        mark: Any = {
-            **grip_mark(i),
-            "ms": 10.5,
-            "mec": "white",
-            "mew": 0.8,
-            "ls": "none",
-            "zorder": 5,
-        }
+        rim: Any = {"ms": 10.5, "mec": "white", "mew": 0.8}
+        mark = grip_mark(i) | rim | {"ls": "none", "zorder": 5}
         axes.plot([x], [y], **mark, gid=name)
         key[i] = Line2D([], [], **mark, label=f"{robot} holds")
         if named:  # labels of neighbors stand in lines, one above the other

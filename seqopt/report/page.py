@@ -183,7 +183,7 @@ def _build_data(
             {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
             for each in build.verdicts
         ],
-        "decides": _deciding_step(scene, build.table, build.verdicts),
+        "decides": _deciding_step(scene, build.table, build.verdicts, build.departures),
         "sentence": build.sentence(scene),
         "arms": arm_data(scene, build.steps, build.arms),
         "steps": [

@@ -51,14 +51,20 @@ def _headline(scene: Scene, table: _Columns) -> str:
     return f"{said}, displacement {length_text(float(f'{moved:.3g}'))}"
 
 
-def _deciding_step(scene: Scene, table: pd.DataFrame, verdicts: Sequence[BuildVerdicts]) -> int:
+def _deciding_step(
+    scene: Scene,
+    table: pd.DataFrame,
+    verdicts: Sequence[BuildVerdicts],
+    departures: Sequence[Departure] = (),
+) -> int:
     """Return the place of the step that decides.
 
-    It is the first that exceeds a payload, or what props bear, or falls with the last mortar; where
-    none does, that of the largest share of a payload.
+    It is the first that exceeds a payload or what props bear, leaves the linear range, or falls
+    with the last mortar; where none does, that of the largest share of a payload.
     """
     over = (*overloads(scene, table), *_prop_faults(scene, table))
     wrong = [number for excess in over for number in excess.steps]
+    wrong += [number for each in departures for number in each.steps]
     wrong += [each.first for each in verdicts[-1:] if each.first]
     if wrong:
         return min(wrong) - int(table["step"].iloc[0])

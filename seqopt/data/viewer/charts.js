@@ -29,7 +29,7 @@ function makeCharts(page) {
     return { box, svg, x, cursor };
   }
   function gantt(build) {
-    const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
+    const steps = build.steps.length, rows = structure.robots.length, width = Math.max(1180, 8.5 * steps), height = 40 + 26 * rows, left = 70;
     const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
     const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
     structure.robots.forEach((robot, r) => {
@@ -48,14 +48,16 @@ function makeCharts(page) {
           const name = structure.bricks[structure.nodes[node].brick].name, span = x(end + 0.5) - x(s - 0.5);
           const mine = draw("rect", { x: x(s - 0.5), y, width: span, height: 20, fill: "none", stroke: "#222", "stroke-width": 0.7 }, svg);
           draw("title", {}, mine, `${robot.words} holds brick ${name} at node ${node}, steps ${build.steps[s].number} to ${build.steps[end].number}`);
-          if (span > 9 * String(name).length) {
-            draw("rect", { x: (x(s - 0.5) + x(end + 0.5)) / 2 - 4 * String(name).length - 1, y: y + 4, width: 8 * String(name).length + 2, height: 13, fill: "#fff", "fill-opacity": 0.85, rx: 2 }, svg);
-            draw("text", { x: (x(s - 0.5) + x(end + 0.5)) / 2, y: y + 14.5, "text-anchor": "middle" }, svg, name);
+          const places = build.steps[s].kind === "place" && rank(build, structure.nodes[node].brick) === build.steps[s].bricks - 1;
+          if (places) {
+            const dot = draw("circle", { cx: x(s), cy: y + 10, r: 3.2, fill: "#fff", stroke: "#222" }, svg);
+            draw("title", {}, dot, `${robot.words} places brick ${name} in step ${build.steps[s].number}`);
           }
-        }
-        if (node !== null && build.steps[s].kind === "place" && rank(build, structure.nodes[node].brick) === build.steps[s].bricks - 1) {
-          const dot = draw("circle", { cx: x(s), cy: y + 10, r: 3.2, fill: "#fff", stroke: "#222" }, svg);
-          draw("title", {}, dot, `${robot.words} places brick ${structure.bricks[structure.nodes[node].brick].name} in step ${build.steps[s].number}`);
+          const half = 4 * String(name).length + 1, mid = Math.max(x(s - 0.5) + span / 2, places ? x(s) + 5 + half : 0);  // beside its dot
+          if (mid + half < x(end + 0.5)) {
+            draw("rect", { x: mid - half, y: y + 4, width: 2 * half, height: 13, fill: "#fff", "fill-opacity": 0.85, rx: 2 }, svg);
+            draw("text", { x: mid, y: y + 14.5, "text-anchor": "middle" }, svg, name);
+          }
         }
         s = end + 1;
       }
@@ -65,6 +67,7 @@ function makeCharts(page) {
     });
     svg.append(cursor);
     box.classList.add("wide");
+    svg.style.minWidth = `${0.7 * width}px`;
     return box;
   }
   const STYLES = [["#1f5fa8", ""], ["#c8102e", "6 3"], ["#0b7a75", "2 2"], ["#7b2d8b", "8 3 2 3"], ["#8a5a00", "4 4"], ["#444", "1 3"]];
@@ -132,7 +135,8 @@ function makeCharts(page) {
   const LOOKS = { stands: "good", falls: "bad", "is undecided": "open" };
   function strip(build, marking) {
     const steps = build.steps.length, over = build.steps.map((_, s) => (structure.robots.some((_, r) => share(build, s, r) > 1 + 1e-9) ? "bad" : "good"));
-    const rows = [["payload", over, "exceeded"], ...build.verdicts.map(({ how, of }) => [how, of.map((word) => LOOKS[word]), "fall"])];
+    const left = build.marks.map((mark) => (mark.includes("linear range") ? "bad" : "good"));
+    const rows = [["payload", over, "exceeded"], ...(left.includes("bad") ? [["linear range", left, "exceeded"]] : []), ...build.verdicts.map(({ how, of }) => [how, of.map((word) => LOOKS[word]), "fall"])];
     return rows.flatMap(([name, looks, wrong]) => {
       const bad = looks.filter((look) => look === "bad").length, open = looks.filter((look) => look === "open").length;
       const said = [bad ? `${plain(bad)} of ${plain(steps)} ${wrong === "fall" ? (bad === 1 ? "falls" : "fall") : "exceeded"}` : "", open ? `${plain(open)} not known` : ""].filter(Boolean).join(", ");

@@ -488,9 +488,14 @@
     marking.forEach((mark) => mark(at));
     charts.cursors.forEach((move) => move(at));
     if (points) points.mark();
+    if (window.parent !== window) window.parent.postMessage({ seqopt: { step: at + 1, build: pair[0].name } }, "*");  // to a widget
   }
   let moved = false;  // by whom looks at it
-  function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
+  function go(s) {
+    slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
+    slider.value = Math.max(0, Math.min(Number(slider.max), s));
+    refresh();
+  }
   function pause() { clearInterval(timer); timer = null; byId("play").textContent = "play"; }
   function play() {
     if (timer) return pause();
@@ -520,12 +525,12 @@
   }
 
   // rows that name a build show it
-  function choose(name) {
+  function choose(name, step = 0) {
     const i = builds.findIndex((build) => build.name === name);
     byId("first").value = i;
     drawCharts();
-    if (moved) refresh();
-    else go(builds[i].decides);
+    if (moved && !step) refresh();
+    else go(step ? step - 1 : builds[i].decides);
     for (const row of document.querySelectorAll("#tables tr[data-build]")) row.classList.toggle("chosen", row.dataset.build === name);
   }
   for (const row of document.querySelectorAll("#tables tbody tr")) {
@@ -576,6 +581,13 @@
     const keys = { ArrowLeft: () => step(-1), ArrowRight: () => step(1), Home: () => go(0), End: () => go(Number(slider.max)), " ": play };
     if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
   });
+  window.addEventListener("message", ({ source, data }) => {
+    if (source !== window.parent || !data?.seqopt) return;
+    const { step, build } = data.seqopt;
+    if (step) moved = true;
+    if (builds.some(({ name }) => name === build) && build !== shown()[0].name) choose(build, step);
+    else if (step) go(step - 1);
+  });
   const asked = new URLSearchParams(location.hash.slice(1));
   if (asked.has("build")) byId("first").value = Math.max(0, builds.findIndex((build) => build.name === asked.get("build")));
   if (asked.has("beside")) byId("second").value = builds.findIndex((build) => build.name === asked.get("beside"));
@@ -583,7 +595,6 @@
   byId("forces").checked = asked.has("forces");
   byId("robots").checked = asked.get("robots") !== "off";
   drawCharts();
-  slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
   moved = asked.has("step");
   go(moved ? Number(asked.get("step")) - 1 : shown()[0].decides);
   pictured();

@@ -38,7 +38,7 @@ from seqopt.graph.formulation import End, Finding, FormulationKind, find_formula
 from seqopt.judge._schedules import plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import pose, states_of
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import on_the_way, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
 from seqopt.problem.problem import Problem
@@ -147,7 +147,7 @@ class _Course:
         free = replace(self.rules, candidates=near or self.rules.candidates)
         moves = free if way.schedule == FREE else self._schedule(engine, near)
         stands = self.mortar if way.without == "stands" else None
-        worst = states_of(self.reference).criterion
+        worst = graph_of(self.reference).criterion
         return pose(engine, moves, worst, "minmax", stands=stands)
 
     def _schedule(self, engine: Engine, near: str) -> Schedule:
@@ -194,7 +194,7 @@ class _Course:
         last, bare = steps[-1], (None,) * len(steps[-1].grips)
         end = [replace(last, grips=bare, kind=StepKind.RELEASE)] if last.held else []
         try:
-            problem = states_of(self.reference)
+            problem = graph_of(self.reference)
             along, *after = (plan_values(problem, part)[0] for part in (steps, end) if part)
         except MechanismError as error:
             return np.inf, np.nan, FALLS, str(error)

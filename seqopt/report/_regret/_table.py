@@ -23,6 +23,7 @@ DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
 COLUMNS = 80  # of a terminal
 MANY = 4  # ways that are counted, not named, where they fail alike
 SAME = 1.1  # times that differ by less are equal: repetitions do
+OF = {"regret": "", "gap": " to its bound", "error": " of its model"}
 USUAL_NAMES = ("overlap_dp", "schedule_search")
 NAMED = {FREE: "the free schedule", "loop": "the loop"}
 
@@ -58,13 +59,6 @@ class RegretTable:
     ``models`` that it solved, its ``status``, and ``why`` there is no plan, or none that holds;
     ``refused``: engines that cannot model the scene, and why; ``curves``: incumbents and bounds
     over time, row by row.
-
-    >>> row = {"engine": "compliance", "schedule": "free", "formulation": "schedule_search"}
-    >>> row |= {"without": "", "exact": True, "seconds": 0.1, "status": "done", "why": ""}
-    >>> table = pd.DataFrame([row]).assign(regret=0.0, gap=0.0, error=0.0)
-    >>> about = "arch25", 25, "compliance", "compliance", "worst-ratio", 10.0
-    >>> RegretTable(*about, table).sentence[:43]
-    'Take compliance with schedule_search on the'
     """
 
     scene: str
@@ -84,7 +78,7 @@ class RegretTable:
         return "\n".join([*_wrapped(self.sentence), "", *self.lines()])
 
     def _repr_html_(self) -> str:
-        return f"<p>{self.sentence}</p>{self.table.drop(columns='why')._repr_html_()}"  # type: ignore[operator]
+        return f"<p>{self.sentence}</p>{self.shown._repr_html_()}"  # type: ignore[operator]
 
     def plot(self) -> Figure:
         """Return the chart of speed against regret (extra ``plot``)."""
@@ -117,12 +111,25 @@ class RegretTable:
         found: pd.Series[float] = best.loc[by.sort_values([*by]).index[0]]
         return found
 
+    @property
+    def shown(self) -> pd.DataFrame:
+        """The table for readers: numbers in words, what there is to say of each way last."""
+        rows = self.table
+        shares = {f"{name}{of}": rows[name].map(percent) for name, of in OF.items()}
+        way = rows[["engine", "schedule"]].assign(formulation=rows.apply(_short, axis=1))
+        why = rows["why"].radd(", ").where(rows["why"] != "", "")
+        proven = rows["exact"].map({True: "yes", False: ""}).rename("proven")
+        seconds = rows["seconds"].rename("time, s")
+        found = way.join([seconds, pd.DataFrame(shares), proven, rows["models"]])
+        return found.assign(outcome=rows["status"] + why)
+
     @cached_property
     def sooner(self) -> pd.DataFrame:
-        """The rows that take less time than the one to take, and lose something for it."""
-        kept = self.table[self.kept & (self.table["regret"] > self.take["regret"])]
-        soon = kept[kept["seconds"] * SAME < self.take["seconds"]]
-        return soon.sort_values("regret").drop_duplicates("regret")
+        """The rows that take less time than the one to take: worse ones, or one without a proof."""
+        soon = self.table[self.kept & (self.table["seconds"] * SAME < self.take["seconds"])]
+        worse = soon[soon["regret"] > self.take["regret"]]
+        found = soon if worse.empty else worse
+        return found.sort_values("regret").drop_duplicates("regret")
 
     @property
     def sentence(self) -> str:
@@ -138,8 +145,9 @@ class RegretTable:
         if self.sooner.empty:
             return f"{said}; nothing else is sooner by more than a tenth."
         one: Any = self.sooner.iloc[0]
-        late = f"in {seconds_text(one['seconds'])}: its plan is {percent(one['regret'])} worse"
-        return f"{said}; sooner is {way_named(one)} {late}."
+        worse = f"its plan is {percent(one['regret'])} worse"
+        end = worse if one["regret"] > took["regret"] else "its plan is as good, without a proof"
+        return f"{said}; sooner is {way_named(one)} in {seconds_text(one['seconds'])}: {end}."
 
     def facts(self) -> dict[str, object]:
         """Return the summary, for scripts."""
