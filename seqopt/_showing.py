@@ -62,6 +62,13 @@ class Page:
             'style="border:0;background:#fff" title="step viewer"></iframe>'
         )
 
+    def widget(self, step: int = 0) -> Any:
+        """Return it as a widget (extra ``notebook``), whose ``step`` and ``build`` can be set.
+
+        ``step``: which one it shows first, from 1; by default the one that decides.
+        """
+        return display(Page, "widget")(self, step)
+
     def save(self, path: str | Path) -> Path:
         """Write the page to a file. Raises `FileError` if it cannot be written."""
         write_text(Path(path), self.text)
