@@ -54,11 +54,14 @@ def main(arguments: Sequence[str]) -> int:
     try:
         if arguments[:1] == ["all"]:
             return run_all(*arguments[1:])
-        if arguments and arguments != ["list"]:
+        if arguments[:1] in (["-h"], ["--help"]):
+            print(__doc__)
+        elif arguments and arguments != ["list"]:
             return find_claim(arguments[0]).main(arguments[1:])
-        last = verdicts()["verdict"]
-        for name, (_, text) in modules().items():
-            print(f"{name:22}{last.get(name, 'not run'):22}{text}")
+        else:
+            last = verdicts()["verdict"]
+            for name, (_, text) in modules().items():
+                print(f"{name:22}{last.get(name, 'not run'):22}{text}")
     except ClaimError as error:
         print(error, file=sys.stderr)
         return FAILS

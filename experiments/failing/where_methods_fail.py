@@ -140,7 +140,7 @@ ENDS = {
 }
 LETTERS = {"refused": "r", "failed": "f", "infeasible": "i", "mechanism": "m"}  # the first counts
 NAMES = {
-    "compliance, to compare": "to compare",
+    "compliance, to compare": "six digits",
     "beam": "beam search",
     "labels": "label setting",
     "lagrangian": "Lagrangian bound",

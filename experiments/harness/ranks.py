@@ -3,51 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
+from experiments.harness.layers import LayeredCosts, Layers
 from seqopt.arrays import Floats
-from seqopt.graph.decision_costs import LayeredCosts
-from seqopt.graph.decisions import Decisions, Windows
-from seqopt.problem.problem import Aim
+from seqopt.graph.states.states import States
+from seqopt.problem.problem import Problem
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
 
 
-def rank_choice(problem: Decisions, choice: Sequence[int]) -> pd.DataFrame:
+def rank_choice(problem: Problem | States, nodes: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
-    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
-    ``bricks``, ``robot``, ``node``, ``candidates`` (how many there are), ``first_in_window`` (the
-    node that ranks first), and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
-    with the least sum of costs to the end of the build added, ``rank_peak`` with the least worst
-    cost to the end.
+    ``nodes``: one for every move. Columns: ``step``, and ``rank_in_window`` of the move alone.
     """
-    sums, peaks = to_go(problem.sums, Aim.SUM), to_go(problem.peaks, Aim.PEAK)
-    rows, windows = [], Windows(problem, [*choice])
-    for k, (before, now) in enumerate(pairwise((0, *choice))):
-        move, window = problem.schedule.moves[k], windows.costs(k)
-        what = {"move": k + 1, "step": move.step, "bricks": move.bricks, "robot": move.robot}
-        ranks = {
-            "node": move.candidates[now],
-            "candidates": len(move.candidates),
-            "first_in_window": move.candidates[int(window.argmin())],
-            "rank_in_window": rank_of(window, now),
-            "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], now),
-            "rank_peak": rank_of(np.maximum(problem.peaks.shared[k][before], peaks[k]), now),
-        }
-        rows.append(what | ranks)
-    return pd.DataFrame(rows)
+    found = Layers(problem)
+    choice = [m.candidates.index(node) for m, node in zip(found.moves, nodes, strict=True)]
+    ranks = map(rank_of, windows(found.alone, choice), choice)
+    return pd.DataFrame({"step": [m.step for m in found.moves], "rank_in_window": [*ranks]})
 
 
-def to_go(costs: LayeredCosts, aim: Aim) -> list[Floats]:
-    """Return the least cost from each candidate (C_k,) to the end, its own included."""
-    out, join = [costs.single[-1]], aim.join
-    for own, pairs in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
-        out.insert(0, join(own, join(pairs, out[0]).min(axis=1)))
-    return out
+def windows(alone: LayeredCosts, choice: Sequence[int]) -> list[Floats]:
+    """Return the costs (C_k,) of every move's candidates after the choice before, as is searched.
+
+    ``alone``: as of `Layers`.
+    """
+    every = zip(alone.single, alone.shared, (0, *choice), strict=False)
+    return [own + pairs[before] for own, pairs, before in every]
 
 
 def rank_of(costs: Floats, chosen: int) -> int:

@@ -23,6 +23,7 @@ Inputs: the shipped scene. Command: ``python -m experiments decision_sensitivity
 [--quick]``.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -32,13 +33,14 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.ranks import rank_of
+from experiments.harness.layers import Layers, best_in_order
+from experiments.harness.ranks import rank_of, windows
 from experiments.harness.results import drawn
-from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
+from seqopt import Scene, Schedule, build_network, load_scene, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import Decisions, Windows, pose_decisions
-from seqopt.graph.formulation import find_formulation
-from seqopt.problem.requirements import Criterion, SceneFacts
+from seqopt.plan.pose import graph_of, pose
+from seqopt.problem.problem import Aim
+from seqopt.problem.requirements import Criterion, Limit, SceneFacts
 from seqopt.report._style import dress, looks, styled
 from seqopt.scene.scenarios import _stiffened, shifted, weighed
 from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
@@ -150,53 +152,52 @@ def chart(table: pd.DataFrame) -> Figure:
 
 
 TESTED: tuple[Criterion, ...] = (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)
-ALSO = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
+EVERY = [Limit(name, math.inf) for name in ("T_max", "M_sup", "D_max")]  # computed at once
 SEEDS = 30
 MEASURES = ("changed", "changed_in_window", "out_of_three", "relative_regret", "average_regret")
 
 
-Decision = tuple[tuple[int, ...], tuple[int, ...]]
-"""Both answers to the nominal problem of a criterion: the best, and the one that is searched."""
-
-
-def problems(scene: Scene, schedule: Schedule) -> dict[str, Decisions]:
-    """Return the problem under every criterion of the nominal scene, all models solved once."""
-    posed = pose_decisions(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
+def problems(scene: Scene, schedule: Schedule) -> dict[str, Layers]:
+    """Return the costs under every criterion of the nominal scene, all models solved once."""
+    engine = ComplianceEngine(build_network(scene))
+    graph = graph_of(pose(engine, schedule, EQUATIONS, limits=EVERY))
     nominal = SceneFacts(ComplianceEngine(build_network(schedule.scene)))
-    return {c.name: replace(posed, criterion=c.for_scene(nominal)) for c in TESTED}
+    return {c.name: Layers(replace(graph, criterion=c.for_scene(nominal))) for c in TESTED}
 
 
-def judge(problem: Decisions, nominal: Decision) -> dict[str, float]:
-    chosen, searched = nominal
-    plan = solve(problem, "overlap_dp")
-    best = plan.certificate.objective
-    regret = max(0.0, problem.sums.cost(chosen) - best)
-    first, three, windows = [], [], Windows(problem, [*searched])
-    for k, node in enumerate(searched):
-        costs = windows.costs(k)
-        first.append(int(np.argmin(costs)) == node)
-        three.append(rank_of(costs, node) <= 3)
-    average = sum(
-        float(costs[np.isfinite(costs)].mean())
-        for costs in (*problem.sums.single, *problem.sums.shared)
-    )
-    row = {"changed": float(np.mean(np.not_equal(plan.choice, chosen)))}
+def judge(costs: Layers, chosen: tuple[int, ...], searched: tuple[int, ...]) -> dict[str, float]:
+    """Return how both answers to the nominal problem fare, the best and that which is searched."""
+    sums, choice = costs.sums, best_in_order([(costs.sums, Aim.SUM)])
+    best = sums.cost(choice)
+    regret = max(0.0, sums.cost(chosen) - best)
+    pairs = [*zip(windows(costs.alone, searched), searched, strict=True)]
+    first = [int(np.argmin(own)) == node for own, node in pairs]
+    three = [rank_of(own, node) <= 3 for own, node in pairs]
+    average = sum(float(costs[np.isfinite(costs)].mean()) for costs in sums.single + sums.shared)
+    row = {"changed": float(np.mean(np.not_equal(choice, chosen)))}
     row |= {"changed_in_window": 1 - float(np.mean(first))}
     row |= {"out_of_three": 1 - float(np.mean(three)), "best": best, "regret": regret}
     return row | {"relative_regret": regret / best, "average_regret": (average - best) / best}
 
 
+def one_by_one(costs: Layers) -> tuple[int, ...]:
+    """Return the choice of the search of one move after the other."""
+    choice = list[int]()
+    for _ in costs.moves:
+        choice.append(int(windows(costs.alone, choice)[-1].argmin()))
+    return tuple(choice)
+
+
 def measure(scene: Scene, wanted: Iterator[tuple[str, float, int]]) -> pd.DataFrame:
     schedule, rows = three_robot_loop(build_network(scene)), []
-    ways = [find_formulation(name) for name in ("overlap_dp", "cascade")]
     nominal = {
-        name: [solve(problem, way).choice for way in ways]
-        for name, problem in problems(scene, schedule).items()
+        name: (best_in_order([(costs.sums, Aim.SUM)]), one_by_one(costs))
+        for name, costs in problems(scene, schedule).items()
     }
     for kind, size, seed in wanted:
-        for name, problem in problems(perturbed(scene, kind, size, seed), schedule).items():
+        for name, costs in problems(perturbed(scene, kind, size, seed), schedule).items():
             row = {"kind": kind, "size": size, "seed": seed, "criterion": name}
-            rows.append(row | judge(problem, nominal[name]))
+            rows.append(row | judge(costs, *nominal[name]))
     return pd.DataFrame(rows)
 
 

@@ -221,7 +221,7 @@ def number_for(question: str, bricks: int, rows: pd.DataFrame, *, cuts: bool) ->
         return 0.0
     asked = QUESTIONS[RANKS]
     least = optimize(scene(bricks), asked.moves, asked.criterion, "labels", budgets="travel=1e9m")
-    return TRAVEL * float(*least.certificate.spent.values())
+    return TRAVEL * least.objective["travel"]
 
 
 def measured(wanted: list[Cell], end: float, *, apart: bool) -> Iterator[dict[str, object]]:

@@ -25,8 +25,9 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -35,61 +36,45 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.layers import LayeredCosts, Layers, best_in_order, compile_totals
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
-from seqopt.graph.decision_costs import (
-    Joined,
-    LayeredCosts,
-    ScenarioCosts,
-    best_in_order,
-    compile_totals,
-)
-from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.graph.formulation import Watch
-from seqopt.graph.states.states import States, of_decisions, over_scenarios
-from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.graph.states.states import States, over_scenarios
+from seqopt.plan.pose import graph_of, pose
+from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, Problem, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
+Choice = tuple[int, ...]
 
-class StepQuantile(NamedTuple):
-    """A choice whose open steps, except a few, keep the least level.
 
-    ``choice``: of those that keep it, one with the fewest steps above, and then of least sum;
-    ``above``: how many of all open ``steps`` cost more.
+def least_quantile(layers: Layers, share: float = 0.1) -> Choice:
+    """Return the choice with the least level that no more than a share of open steps exceed.
+
+    Of those that keep it one with the fewest steps above, and then of least sum.
     """
-
-    choice: tuple[int, ...]
-    level: float
-    above: int
-    steps: int
-
-
-def least_quantile(problem: Decisions, share: float = 0.1) -> StepQuantile:
-    """Return the choice with the least level that no more than a share of open steps exceed."""
-    steps = [(each.moves, problem.step_costs(each)) for each in problem.evaluation.steps]
-    most = math.floor(share * len(steps) + 1e-9)
-    levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
+    most = math.floor(share * len(layers.steps) + 1e-9)
+    levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in layers.steps]))
 
     def above(level: float) -> LayeredCosts:
         """Return how many steps of a choice cost more, infinite where not allowed."""
-        joined = Joined(problem.sums.sizes, np.add)
-        for moves, costs in steps:
-            joined.add(moves, np.where(np.isfinite(costs), (costs > level).astype(float), np.inf))
-        return joined.layered()
+        counts = [
+            (moves, np.where(np.isfinite(costs), costs > level, np.inf))
+            for moves, costs in layers.steps
+        ]
+        return layers.joined(np.add, counts)
 
     def kept(level: float) -> bool:
         return above(level).least(Aim.SUM) <= most
 
     level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
-    counts = above(level)
-    choice = best_in_order([(counts, Aim.SUM), (problem.sums, Aim.SUM)])
-    return StepQuantile(choice, level, round(counts.cost(choice)), len(steps))
+    return best_in_order([(above(level), Aim.SUM), (layers.sums, Aim.SUM)])
 
 
 AIMS: dict[RobustAim, Criterion] = {
@@ -98,7 +83,6 @@ AIMS: dict[RobustAim, Criterion] = {
     cvar(0.9): WEIGHTED,
     cvar(0.5): WEIGHTED,
 }
-Choice = tuple[int, ...]
 UNSEEN_SEED = 1000  # no plan is made with it
 TAIL = cvar(0.9)
 
@@ -112,115 +96,115 @@ class Effort(NamedTuple):
     limit: float
 
 
-def posed(scene: Scene, criterion: Criterion) -> Decisions:
+def posed(scene: Scene, criterion: Criterion) -> Problem:
     engine = make_engine("compliance", build_network(scene))
-    return pose_decisions(engine, three_robot_loop(engine.network), criterion)
+    return pose(engine, three_robot_loop(engine.network), criterion)
 
 
-def over_draws(problem: Decisions, count: int, seed: int) -> States:
-    """Return the candidates over so many scenarios."""
-    some = scenarios(problem.schedule.scene, count=count, seed=seed).scenes
-    return over_scenarios(of_decisions(problem), some, WORST_PEAK)
+def over_draws(problem: Problem, count: int, seed: int) -> States:
+    """Return the states over so many scenarios, whose peaks or totals count by the criterion."""
+    over = WORST_PEAK if problem.criterion.name == WORST_RATIO.name else WORST_TOTAL
+    some = scenarios(problem.scene, count=count, seed=seed).scenes
+    return over_scenarios(graph_of(problem, over.aim), some, over)
 
 
-def values(graph: States, aim: Aim, choice: Choice) -> Floats:
+def of_scenarios(graph: States) -> list[LayeredCosts]:
+    """Return what candidates cost in every scenario, as its aim counts."""
+    found = map(Layers, graph.each)
+    return [own.sums if graph.over.aim is Aim.SUM else own.peaks for own in found]
+
+
+def values(aim: Aim, every: Sequence[LayeredCosts], choices: Iterable[Choice]) -> Floats:
     """Return the value of a choice in every scenario, infinite where it exceeds a limit."""
-    found = map(aim.costs, graph.costs_in_scenarios)
-    return np.array([(costs.cost if aim is Aim.SUM else costs.worst)(choice) for costs in found])
+    pairs = zip(every, choices, strict=False)
+    return np.array([(c.cost if aim is Aim.SUM else c.worst)(choice) for c, choice in pairs])
+
+
+def best(costs: LayeredCosts, aim: Aim) -> Choice:
+    return best_in_order([(costs, aim), (costs, Aim.SUM)])
 
 
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
     for criterion in (WORST_RATIO, WEIGHTED):
         problem = posed(scene, criterion)
-        unseen = over_draws(problem, effort.unseen, UNSEEN_SEED)
+        alone = Layers(problem)
+        nominal = alone.peaks if criterion is WORST_RATIO else alone.sums
+        unseen = of_scenarios(over_draws(problem, effort.unseen, UNSEEN_SEED))
         for seed in range(effort.seeds):
             most = over_draws(problem, max(effort.counts), seed)
+            sets = {"nominal": (nominal,), "optimized": of_scenarios(most), "unseen": unseen}
             for aim in (aim for aim, own in AIMS.items() if own is criterion):
                 for count in effort.counts:
-                    some = most.scenarios[:count]
-                    plan = solve(replace(most, over=aim, scenarios=some))
+                    some = replace(most, over=aim, scenarios=most.scenarios[:count])
                     row = {"aim": str(aim), "criterion": criterion.name, "seed": seed}
-                    yield row | {"scenarios": count} | measured(plan, unseen)
+                    seen = sets | {"optimized": sets["optimized"][:count]}
+                    yield row | {"scenarios": count} | measured(some, seen)
 
 
-def measured(plan: Plan, unseen: States) -> dict[str, object]:
-    """Return the objective of a plan where it was made and elsewhere, beside two others.
+def measured(graph: States, sets: Mapping[str, Sequence[LayeredCosts]]) -> dict[str, object]:
+    """Return the objective of the plan of a graph where it was made and elsewhere, beside two more.
 
     Those are the exact optimum of the nominal scene, and the best plan of each scenario alone.
     """
-    graph, proof = plan.graph.alone_in_scene, plan.certificate
-    own = graph.decisions
+    plan, aim = solved(graph), graph.over.aim
+    proof = plan.certificate
     assert proof is not None
-    assert own is not None
-    aim, known = graph.over.aim, ScenarioCosts(own.sums, own.peaks, 0, 0.0)
-
-    def best(costs: ScenarioCosts) -> Choice:
-        return best_in_order([(aim.costs(costs), aim), (aim.costs(costs), Aim.SUM)])
-
     row = {"objective": proof.objective, "gap": proof.claimed_gap, "gap_by_weights": proof.gap}
-    row |= {"solve_s": plan.seconds["solve"]}
-    nominal, sets = best(known), {"nominal": (known,), "optimized": graph.costs_in_scenarios}
-    for name, found in (sets | {"unseen": unseen.costs_in_scenarios}).items():
-        choices = {"robust": [plan.choice] * len(found), "nominal": [nominal] * len(found)}
-        for who, each in (choices | {"knows_it": [*map(best, found)]}).items():
-            pairs = zip(found, each, strict=True)
-            reached = [
-                (costs.sums.cost if aim is Aim.SUM else costs.peaks.worst)(choice)
-                for costs, choice in pairs
-            ]
-            row[f"{name}_{who}"] = graph.over.value(np.array(reached))
+    nominal = best(sets["nominal"][0], aim)
+    for name, found in sets.items():
+        choices = {"robust": repeat(plan.choice), "nominal": repeat(nominal)}
+        for who, each in {**choices, "knows_it": (best(own, aim) for own in found)}.items():
+            row[f"{name}_{who}"] = graph.over.value(values(aim, found, each))
     return {**row}
+
+
+def solved(graph: States) -> Plan:
+    return solve(graph, "scenario_search" if graph.totals else "minimax")
 
 
 def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     """Return the integer programs beside the cuts: values, bounds and times."""
-    found, most = [], over_draws(posed(scene, WEIGHTED), count, 0)
+    found, most = [], of_scenarios(over_draws(posed(scene, WEIGHTED), count, 0))
     for aim in (WORST_TOTAL, TAIL):
-        plan = solve(replace(most, over=aim))
-        start = time.perf_counter()
-        compiled = compile_totals("totals", [c.sums for c in most.costs_in_scenarios], aim)
-        told, value = solve_program(
-            compiled.instance.asked, aim.most(count), whole=True, watch=Watch(limit)
-        )
+        instance = compile_totals("totals", most, aim).instance
+        plan, start = solve(instance, "scenario_search"), time.perf_counter()
+        how = {"whole": True, "watch": Watch(limit)}
+        told, value = solve_program(instance.asked, aim.most(count), **how)
         row = {"aim": str(aim), "scenarios": count, "objective": plan.objective[str(aim)]}
         row |= {"bound": plan.selection.bound[0], "solve_s": plan.seconds["solve"]}
-        row |= {"program": value + compiled.offset}
-        row |= {"program_bound": told.bounds[0] + compiled.offset}
+        row |= {"program": value, "program_bound": told.bounds[0]}
         found.append(row | {"program_s": time.perf_counter() - start, "limit_s": limit})
     return pd.DataFrame(found)
 
 
-def plans(scene: Scene, count: int) -> dict[str, Choice]:
-    ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
-    peaks, totals = (over_draws(problem, count, 0) for problem in (worst, total))
-    return {
-        "rank": solve(ranks, "overlap_dp").choice,
-        "sum": solve(total, "overlap_dp").choice,
-        "worst": solve(worst, "minimax").choice,
-        "worst, then sum": best_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]),
-        "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
-        "robust, worst peak": solve(peaks).choice,
-        "robust, worst total": solve(replace(totals, over=WORST_TOTAL)).choice,
-        "robust, cvar=0.9": solve(replace(totals, over=TAIL)).choice,
-    }
-
-
 def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
-    ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
-    peaks, totals = (over_draws(problem, unseen, UNSEEN_SEED) for problem in (worst, total))
-    steps = [(c.moves, worst.step_costs(c)) for c in worst.evaluation.steps]
+    asked = [posed(scene, criterion) for criterion in (EQUATIONS, WEIGHTED, WORST_RATIO)]
+    (ranks, total, worst), (_, *pair) = map(Layers, asked), asked
+    totals, peaks = (over_draws(problem, count, 0) for problem in pair)
+    plans = {
+        "rank": best_in_order([(ranks.sums, Aim.SUM)]),
+        "sum": best_in_order([(total.sums, Aim.SUM)]),
+        "worst": solve(asked[2], "minimax").choice,
+        "worst, then sum": best_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]),
+        "all but a tenth of the steps": least_quantile(worst, 0.1),
+        "robust, worst peak": solved(peaks).choice,
+        "robust, worst total": solved(totals).choice,
+        "robust, cvar=0.9": solved(replace(totals, over=TAIL)).choice,
+    }
+    sums, high = (of_scenarios(over_draws(problem, unseen, UNSEEN_SEED)) for problem in pair)
 
     def tenth(choice: Choice) -> float:
-        costs = np.sort([costs[tuple(choice[m] for m in moves)] for moves, costs in steps])
+        costs = np.sort([c[tuple(choice[m] for m in moves)] for moves, c in worst.steps])
         return float(costs[::-1][int(0.1 * len(costs) + 1e-9)])
 
     rows = []
-    for name, choice in plans(scene, count).items():
-        high, sums = values(peaks, Aim.PEAK, choice), values(totals, Aim.SUM, choice)
+    for name, choice in plans.items():
+        peak = values(Aim.PEAK, high, repeat(choice))
+        each = values(Aim.SUM, sums, repeat(choice))
         row = {"plan": name, "ranks": ranks.sums.cost(choice), "sum": total.sums.cost(choice)}
         row |= {"worst": worst.peaks.worst(choice), "tenth": tenth(choice)}
-        row |= {"unseen_peak": WORST_PEAK.value(high), "unseen_peak_median": float(np.median(high))}
-        row |= {"unseen_total": WORST_TOTAL.value(sums), "unseen_tail": TAIL.value(sums)}
+        row |= {"unseen_peak": WORST_PEAK.value(peak), "unseen_peak_median": float(np.median(peak))}
+        row |= {"unseen_total": WORST_TOTAL.value(each), "unseen_tail": TAIL.value(each)}
         rows.append(row)
     return pd.DataFrame(rows)
 

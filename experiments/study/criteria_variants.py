@@ -12,6 +12,7 @@ Inputs: the shipped scene and plan. Command: ``python -m experiments criteria_va
 [--quick]``.
 """
 
+import math
 from dataclasses import replace
 from itertools import product
 
@@ -23,11 +24,12 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.ranks import rank_choice
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
-from seqopt import three_robot_loop
-from seqopt.graph.decisions import Decisions, pose_decisions
+from seqopt import Problem, three_robot_loop
+from seqopt.plan.pose import graph_of, pose
 from seqopt.problem.criteria import RankSum, equal
+from seqopt.problem.requirements import Limit
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
-from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_choice
+from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_plan
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
 
@@ -62,12 +64,12 @@ def variants() -> list[RankSum]:
     return out
 
 
-def scores(problem: Decisions, criteria: list[RankSum]) -> pd.DataFrame:
+def scores(problem: Problem, criteria: list[RankSum]) -> pd.DataFrame:
     """Return how often each criterion names the published node first, and among three."""
-    choice = published_choice(problem)
+    graph, nodes = graph_of(problem), problem.schedule.chosen(published_plan(problem.scene))
     rows = []
     for criterion in criteria:
-        ranks = rank_choice(replace(problem, criterion=criterion), choice)["rank_in_window"]
+        ranks = rank_choice(replace(graph, criterion=criterion), nodes)["rank_in_window"]
         before, after, crown, rounded = criterion.name.split(" | ")
         row = {"before_crown": before, "after_crown": after, "after_from_brick": int(crown)}
         rows.append(row | {"rounded_to": float(rounded), **_places(ranks)})
@@ -101,8 +103,8 @@ def chart(table: pd.DataFrame) -> Figure:
 
 def experiment(options: Options) -> Finding:
     engine, tried = arch25(), variants()
-    also = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
-    problem = pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
+    every = [Limit(name, math.inf) for name in ("T_max", "M_sup", "D_max")]  # computed once
+    problem = pose(engine, three_robot_loop(engine.network), EQUATIONS, limits=every)
     if options.quick:
         closest = {CLOSEST.before, CLOSEST.after}, CROWN + CLOSEST.delay
         tried = tried[:1] + [c for c in tried if ({c.before, c.after}, c.crown) == closest]

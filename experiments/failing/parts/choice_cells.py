@@ -24,14 +24,14 @@ from unittest.mock import patch
 
 import numpy as np
 
+from experiments.harness.layers import Budget, LayeredCosts
 from experiments.harness.scenes import half_circle
 from formulations import solvers
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import Formulation, FormulationKind, formulations
+from seqopt.plan.pose import pose
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
@@ -169,10 +169,17 @@ def opposed(size: Size, rng: Rng, total: float) -> Costs:
     return replace(problem, budgets=budgets)
 
 
+def negative(size: Size, rng: Rng) -> Costs:
+    """Return a problem with costs below zero, which its graph refuses."""
+    problem = whole(size.sizes, rng, least=-9)
+    problem.compiled()
+    return problem
+
+
 def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Costs:
     """Return the problem of the three-robot loop on a small arch."""
     engine = ComplianceEngine(half_circle(size.bricks))
-    return of_layers(pose_decisions(engine, three_robot_loop(engine.network), criterion, limits))
+    return of_layers(pose(engine, three_robot_loop(engine.network), criterion, limits=limits))
 
 
 def tight(size: Size, _: Rng) -> Costs:
@@ -186,7 +193,6 @@ CASES: dict[str, Case] = {
     "equal costs": lambda size, _: costs(size.sizes, lambda shape: np.full(shape, 5.0)),
     "all costs zero": lambda size, _: costs(size.sizes, np.zeros),
     "equal but for rounding": rounded,
-    "negative costs": lambda size, rng: whole(size.sizes, rng, least=-9),
     "one move": lambda size, rng: whole((size.candidates,), rng),
     "one candidate per move": lambda size, rng: whole((1,) * size.moves, rng),
     "one candidate left by limits": one_left,
@@ -207,7 +213,7 @@ CASES: dict[str, Case] = {
     "budgets not met by mixtures": lambda size, rng: opposed(size, rng, 0.9),
     "budget amount NaN": lambda size, rng: capped(size, rng, np.nan, 1.0),
 }
-MALFORMED = {"one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
+MALFORMED = {"negative costs", "one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 CLOSE = 1e-6  # relative: values this close are equal
 SCALES = tuple(10.0**power for power in range(-12, 13, 3))

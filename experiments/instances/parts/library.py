@@ -52,7 +52,6 @@ MADE = {
     "chain-25-way-50": "arch25 --budget travel=0.5",
     "chain-25-two": "arch25 --budget travel=0.8 --budget steps_over:M_sup=20:30",
     "chain-25-weighted-way": "arch25 --criteria weighted --budget travel=0.5",
-    "chain-40-way": f"{CHAIN}40 --budget travel=0.6",
     "chain-145-way": f"{CHAIN}145 --candidates near:4 --budget travel=0.6",
     # over scenarios
     "chain-12-cvar": f"{CHAIN}12 --criteria weighted --robust cvar=0.75 --scenarios 8",

@@ -70,37 +70,10 @@ class StagedState(FrozenValue):
 def analyze_staged(
     network: Network | Scene, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> pd.DataFrame:
-    """Return the responses of every step, including forces that earlier steps lock in.
+    """Return the responses of every step, with forces that earlier steps lock in, as `analyze`.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    steps : sequence of Step
-        From the first brick on, with every grip given.
-    placing : Placing or str, optional
-        Where a brick is set down.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As `seqopt.responses.table.analyze`. Displacements are from where the plan has the nodes.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As an engine does, the step named.
-    StepError
-        If the steps are not the whole of a build up to its last one.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> steps = seqopt.sequential(network)
-    >>> scratch = seqopt.analyze(seqopt.make_engine("compliance", network), steps)
-    >>> staged = analyze_staged(network, steps)
-    >>> [round(float(table["M_sup_Nm"].max()), 1) for table in (scratch, staged)]
-    [66.3, 72.5]
+    ``steps``: from the first brick on, with every grip given; displacements are from where the plan
+    has the nodes.
     """
     network = network_of(network)
     return response_table(network, zip(steps, staged_fields(network, steps, placing), strict=True))

@@ -20,9 +20,10 @@ from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import Decisions, pose_decisions
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.plan.pose import pose
+from seqopt.problem.problem import Problem
 from seqopt.report.comparison import Comparison, compare
 from seqopt.scene.boxes import box_corners
 from seqopt.scene.scene import Scene
@@ -36,7 +37,7 @@ from seqopt.study.published import (
     as_printed,
     printed,
     printed_steps,
-    published_choice,
+    published_plan,
 )
 
 Rows = Iterator["Row"]
@@ -59,7 +60,7 @@ class Ours:
 
     engine: ComplianceEngine
     methods: Comparison
-    problem: Decisions
+    problem: Problem
 
     @property
     def scene(self) -> Scene:
@@ -74,7 +75,7 @@ class Ours:
 def ours() -> Ours:
     """Return the models that counterparts are read from."""
     engine = ComplianceEngine(build_network(load_scene("arch25")))
-    problem = pose_decisions(engine, three_robot_loop(engine.network), EQUATIONS)
+    problem = pose(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
 
@@ -301,9 +302,9 @@ def plan_rows(own: Ours) -> tuple[pd.DataFrame, list[Step], pd.DataFrame]:
     """Return the printed plan, the loop filled with its nodes, and where these rank."""
     study = printed("three_robot_plan")
     study = study.rename(columns={f"rob{i}_node": f"rob{i}" for i in (1, 2, 3)})
-    choice = published_choice(own.problem)
-    steps = own.problem.schedule.fill(own.problem.nodes(choice))
-    return study, list(steps), rank_choice(own.problem, choice)
+    schedule = own.problem.schedule
+    nodes = schedule.chosen(published_plan(own.scene))
+    return study, [*schedule.fill(nodes)], rank_choice(own.problem, nodes)
 
 
 def loop(own: Ours) -> Rows:
