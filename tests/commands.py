@@ -7,7 +7,7 @@ from seqopt._cli.main import main
 
 def beside_models(err):
     """Return standard error without what was enough, which every run says."""
-    said = ("enough: ", "left out: ", "proof: ", "grips: ")
+    said = ("enough: ", "taken: ", "left out: ", "proof: ", "grips: ")
     return "".join(line for line in err.splitlines(keepends=True) if not line.startswith(said))
 
 

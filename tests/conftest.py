@@ -16,8 +16,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
+from seqopt.plan.pose import pose
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study.published import EQUATIONS
@@ -85,4 +85,4 @@ def loop25(engine25):
 
 @pytest.fixture(scope="session")
 def problem25(engine25, loop25):
-    return pose_decisions(engine25, loop25, EQUATIONS, also=("F_largest",))
+    return pose(engine25, loop25, EQUATIONS)

@@ -7,9 +7,9 @@ from itertools import product
 
 import numpy as np
 
-from seqopt.graph.decision_costs import Budget, LayeredCosts, compile_costs
+from experiments.harness.layers import Budget, LayeredCosts, Layers, compile_costs
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
-from seqopt.plan._answers import find_path, require_fit
+from seqopt.plan._answers import find_path
 from seqopt.problem.problem import Aim
 
 
@@ -27,7 +27,8 @@ class Costs:
         return self.largest or self.sums
 
     def compiled(self, aim=Aim.SUM):
-        return compile_costs("drawn", aim.costs(self), aim, self.budgets, self.alone or self.sums)
+        costs = self.sums if aim is Aim.SUM else self.peaks
+        return compile_costs("drawn", costs, aim, self.budgets, self.alone or self.sums)
 
     def worth(self, choice, aim=Aim.SUM):
         return (self.sums.cost if aim is Aim.SUM else self.peaks.worst)(choice)
@@ -46,9 +47,10 @@ class Costs:
         return min(self.within(aim).values(), default=np.inf)
 
 
-def of_layers(layers):
-    """The costs of candidates that were computed for a build."""
-    return Costs(layers.sums, layers.budgets, layers.alone, layers.peaks)
+def of_layers(problem):
+    """The costs of candidates that were computed for a problem."""
+    layers = Layers(problem)
+    return Costs(layers.sums, (), layers.alone, layers.peaks)
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,9 @@ def answer(
 ):
     """The judged answer of a formulation, by name or itself, for costs."""
     formulation = as_formulation(formulation)
-    require_fit(costs.budgets, formulation, options)
     compiled = costs.compiled(aim or aim_of(formulation))
     run = Run(time_limit, progress, proof, options=options)
-    found = find_path(compiled.instance, formulation, run, compiled.offset)
+    found = find_path(compiled.instance, formulation, run)
     claimed = found.selection
     caps = [cap.name for cap in compiled.instance.caps]
     prices = dict(zip(caps, claimed.prices[0] if claimed.prices else (), strict=False))
@@ -123,11 +124,10 @@ def told(
     stopped="",
 ):
     """A formulation that answers as it is told, whatever is true."""
-    offset = costs.compiled(aim).offset
 
     def solve(instance):
         states = tuple((node,) for node in path_of(costs.compiled(aim), choice))
-        values = (objective - offset,), (bound - offset,)
+        values = (objective,), (bound,)
         return Solution(states, *values, prices=(tuple(prices),), stopped=stopped)
 
     return Formulation("told", "", kind, aim, solve, takes_budgets=True)

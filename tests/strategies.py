@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
+from experiments.harness.layers import Budget, LayeredCosts
 from experiments.harness.scenes import running_bond
-from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of
 from seqopt.scene.parts import Anywhere, Load, Prop, Robot, Side, Sphere
@@ -164,12 +164,12 @@ def problems(draw, most_moves=5, most_candidates=4):
 
 @st.composite
 def budgeted(draw, most_budgets=3):
-    """A problem with budgets on whole amounts, some negative, of choices and of pairs."""
+    """A problem with budgets on whole amounts, of choices and of pairs."""
     problem = draw(problems())
 
     def arrays(parts):
         sizes = [part.size for part in parts]
-        flat = draw(st.lists(st.integers(-1, 3), min_size=sum(sizes), max_size=sum(sizes)))
+        flat = draw(st.lists(st.integers(0, 3), min_size=sum(sizes), max_size=sum(sizes)))
         cuts = np.split(np.array(flat, float), np.cumsum(sizes)[:-1])
         return tuple(cut.reshape(part.shape) for cut, part in zip(cuts, parts, strict=True))
 

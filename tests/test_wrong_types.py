@@ -11,7 +11,6 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
-from seqopt.graph.decisions import pose_decisions
 from seqopt.problem.criteria import RankSum, WeightedSum
 from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks
@@ -22,7 +21,7 @@ NETWORK = seqopt.build_network(SCENE)
 ENGINE = ComplianceEngine(NETWORK)
 LOOP = seqopt.three_robot_loop(NETWORK)
 EQUATIONS = seqopt.CRITERIA["equations-2-3"]
-PROBLEM = pose_decisions(ENGINE, LOOP, EQUATIONS)
+PROBLEM = seqopt.pose(ENGINE, LOOP, EQUATIONS)
 
 
 @pytest.mark.parametrize("engine", [ComplianceEngine, FrameEngine, DiscreteEngine, AutoEngine])
@@ -48,8 +47,8 @@ def test_what_is_meant_is_taken(tmp_path):
     assert Robot(name="r", payload=1.0, reach="anywhere").reach == Anywhere()
     assert seqopt.make_engine("discrete", SCENE, "dry").network.scene == SCENE
     steps = seqopt.sequential(SCENE)[:2]
-    dry = seqopt.assess_steps(SCENE, steps, "dry")
-    assert dry == seqopt.assess_steps(NETWORK, steps, seqopt.DRY)
+    dry = seqopt.assess(SCENE, steps, "dry")
+    assert dry == seqopt.assess(NETWORK, steps, seqopt.DRY)
     limit = seqopt.Limit("T_max", 1e6)
     assert seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=limit).limits == (limit,)
     own = seqopt.formulations()["overlap_dp"]
@@ -91,7 +90,7 @@ WRONG = {
     "a str is not a network": lambda: seqopt.sequential("arch25"),
     "a Network is not a scene": lambda: seqopt.build_network(NETWORK),
     "a int is not a name of a scene": lambda: seqopt.load_scene(25),
-    "mortar 'glue': give a Mortar, or one of": lambda: seqopt.make_engine("auto", SCENE, "glue"),
+    "mortar glue: give epoxy, dry, or bond=": lambda: seqopt.make_engine("auto", SCENE, "glue"),
     "robot r: reach is 'far'; give Anywhere": lambda: Robot(name="r", payload=1.0, reach="far"),
     "is no engine; take one of": lambda: seqopt.pose(NETWORK, LOOP, EQUATIONS),
     "'weighted' is no criterion": lambda: seqopt.pose(ENGINE, LOOP, "weighted"),

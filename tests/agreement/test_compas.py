@@ -15,7 +15,7 @@ from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.exchange._content import Given
 from seqopt.exchange.contacts import flat_face
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import METHODS
@@ -84,7 +84,7 @@ def test_a_plan_goes_back_into_the_assembly(tmp_path):
     scene = imported("bridge")
     steps = METHODS["sequential"](build_network(scene), ())
     path = tmp_path / "back.json"
-    path.write_text(export_plan(scene, steps, "compas_assembly", FOLDER / "bridge.json"), "utf-8")
+    path.write_text(export(scene, steps, "compas_assembly", FOLDER / "bridge.json"), "utf-8")
     back = compas.json_load(path)
     graph = back.graph
     assert graph.number_of_nodes() == 16

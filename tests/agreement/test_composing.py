@@ -14,15 +14,16 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
-from seqopt.graph.decisions import pose_decisions, walk_windows
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
 from seqopt.graph.states.states import build_states
+from seqopt.graph.states.walk import walk
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
+from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
-from seqopt.responses._choices import window_models
 from seqopt.sequence.methods import SCHEDULES, modified_sequential, three_robot_loop
 from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.sequence.schedule import thin
+from seqopt.sequence.schedule import OpenGrip, thin
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
@@ -45,6 +46,17 @@ class Ticking(Watch):
 FIRST, *OTHERS = CRITERIA
 
 
+def windows(schedule, nodes):
+    """How many grip sets candidates of one move after the other have, those before it chosen."""
+    met = set()
+    for step in (step for step in schedule.steps if step.moves):
+        for node in schedule.moves[step.moves[-1]].candidates:
+            chosen = {**dict(enumerate(nodes)), step.moves[-1]: node}
+            held = [chosen[g.move] if isinstance(g, OpenGrip) else g for g in step.grips if g]
+            met.update({(step.bricks, frozenset(held))} if len({*held}) == len(held) else ())
+    return len(met)
+
+
 @pytest.mark.parametrize(
     ("criterion", "method"),
     [
@@ -55,42 +67,45 @@ FIRST, *OTHERS = CRITERIA
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
     counting = Counting(engine25)
-    asked = pose_decisions(counting, schedule, CRITERIA[criterion])
+    asked = graph_of(pose(counting, schedule, CRITERIA[criterion]))
     counting.sets = 0  # some criteria ask for the scene's methods when they are posed
     found = solve(asked, "cascade", proof=False)
-    problem = pose_decisions(engine25, schedule, CRITERIA[criterion])
+    problem = pose(engine25, schedule, CRITERIA[criterion])
     for name, options in (("rank_search", {"horizon": 1}), ("cascade", {})):
         plan = solve(problem, name, **options)
         assert found.nodes == plan.nodes
         assert found.steps == plan.steps
-    fewest = window_models(schedule, found.choice)
     for name, options in (("rank_search", {}), ("rank_search", {"horizon": 1})):
         assert solve(problem, name, proof=False, **options).nodes == found.nodes
-    assert fewest == found.models
-    assert fewest <= counting.sets <= fewest + len(schedule.moves)
-    assert found.models <= problem.evaluation.models
+    fewest = windows(schedule, found.nodes)
+    if isinstance(CRITERIA[criterion], RankSum):
+        assert fewest == found.models
+    else:  # what one step turns down no later one is asked; one candidate is no decision
+        pairs = pairwise(len(move.candidates) for move in schedule.moves)
+        forced = sum(before for before, now in pairs if now == 1)
+        assert found.models <= fewest + forced
+    assert found.models <= counting.sets <= found.models + len(schedule.moves)
+    assert found.models < plan.models
 
 
 @pytest.mark.parametrize(("response", "bound"), [("M_sup", 12)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
-    problem = pose_decisions(engine25, schedule, EQUATIONS, limits)
-    found = walk_windows(problem, Watch())
-    assert tuple(found.choice) == solve(problem, "cascade").choice
-    assert (
-        found.choice != walk_windows(pose_decisions(engine25, schedule, EQUATIONS), Watch()).choice
-    )
+    bound, free = (pose(engine25, schedule, EQUATIONS, limits=some) for some in (limits, ()))
+    found = solve(bound, "cascade", proof=False)
+    assert found.nodes == solve(bound, "cascade").nodes
+    assert found.nodes != solve(free, "cascade", proof=False).nodes
 
 
 def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
     """An hour is enough; of no time every moment is the last."""
-    problem = pose_decisions(engine25, three_robot_loop(engine25.network), EQUATIONS)
+    problem = pose(engine25, three_robot_loop(engine25.network), EQUATIONS)
     plan = solve(problem, "cascade", proof=False, time_limit=3600.0)
     assert plan.nodes == solve(problem, "cascade", proof=False).nodes
-    with pytest.raises(TimeUpError, match=r"^.* s: no move was chosen yet; give more"):
+    with pytest.raises(TimeUpError, match=r"^.* s: no grip was chosen yet; give more"):
         solve(problem, "cascade", proof=False, time_limit=0.0)
-    with pytest.raises(SolverError, match=r"[1-9] of 22 moves were chosen, at nodes 4"):
-        walk_windows(problem, Ticking(time_limit=8.0))
+    with pytest.raises(SolverError, match=r"grips of [1-9]\d? of 90 steps were chosen"):
+        walk(graph_of(problem), Ticking(time_limit=8.0))
 
 
 # schedules, aims, limits, budgets, standing, scenarios, candidates: any of them together

@@ -227,7 +227,7 @@ def test_every_way_to_a_verdict_counts_the_loads(share, sign):
     factor = share * plane_collapse(scene, DRY.friction)
     pushed = replace(scene, loads=(Load(brick=3, force=(10.0 * factor, 0.0, 0.0)),))
     network, steps = seqopt.build_network(pushed), last_step(pushed)
-    assert seqopt.assess_steps(network, steps, DRY)[0].verdict is expected
+    assert seqopt.assess(network, steps, DRY)[0].verdict is expected
     assert next(each_verdict(network, steps, DRY)).verdict is expected
     assert Screen(network, DRY).stands(4, [[0, 0, 0]]).tolist() == [sign]
     assert (Margins(network, DRY).bond(4, [[0, 0, 0]])[0, 0] > 0) == (sign < 0)

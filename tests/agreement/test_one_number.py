@@ -1,4 +1,4 @@
-"""One question has one number, whoever is asked: layers of candidates, states, instances.
+"""One question has one number, whoever is asked: what formulations minimize, goals, instances.
 
 A sum and a worst value are over every step for which the criterion is defined: responses in all of
 them, ranks where a grip is open. Travel is that of all robots, from every grip to the next.
@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.decisions import steps_over, travel
+from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge._schedules import plan_values
-from seqopt.plan.pose import graph_of, states_of
+from seqopt.plan.pose import graph_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
@@ -53,8 +52,8 @@ def exact(aim=None):
     return found + (["overlap_lp", "lagrangian"] if aim is Aim.SUM else [])
 
 
-def by_layers(problem, aim):
-    """What layers of candidates say, by every exact formulation, and by two made exact."""
+def by_aims(problem, aim):
+    """What a problem without goals says, by every exact formulation, and by two made exact."""
     for name in exact(aim):
         yield name, seqopt.solve(problem, name).certificate.objective
     if aim is Aim.SUM:
@@ -66,8 +65,8 @@ def by_layers(problem, aim):
         yield "instance", seqopt.solve(told).certificate.objective
 
 
-def by_states(problem, aim):
-    """What states of the same schedule say, by every exact formulation."""
+def by_goals(problem, aim):
+    """What the same problem with a goal says, by every exact formulation."""
     asked = problem.but(goals=GOALS[aim])
     for name in exact():
         yield name, seqopt.solve(asked, name).objective[GOALS[aim]]
@@ -88,7 +87,7 @@ def of_steps(problem, aim):
     found["F_largest"] = forces.fillna(0.0).to_numpy(float)
     rows = [{n: v[k : k + 1] for n, v in found.items()} for k in range(len(plan.steps))]
     each = [
-        float(graph_of(problem, moves=True).decisions.criterion.costs(row, step.bricks, 1)[0])
+        float(problem.criterion.costs(row, step.bricks, 1)[0])
         for row, step in zip(rows, plan.steps, strict=True)
     ]
     yield "steps", sum(each) if aim is Aim.SUM else max(each)
@@ -101,9 +100,8 @@ def of_steps(problem, aim):
 def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, aim):
     problem = posed(schedule, criterion)
     found = dict(of_steps(problem, aim))
-    kinds = {"layers": by_layers, "states": by_states}
-    for kind, ask in kinds.items():
-        found |= {f"{kind}, {name}": value for name, value in ask(problem, aim)}
+    for ask in (by_aims, by_goals):
+        found |= {f"{ask.__name__}, {name}": value for name, value in ask(problem, aim)}
     assert len(found) > 10
     assert found == pytest.approx(dict.fromkeys(found, found["steps"]), rel=1e-6)
 
@@ -113,28 +111,34 @@ def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, 
 def test_ranks_are_of_open_grips_alone(schedule, aim):
     """Other steps have no candidates: no rank of one out of one is added."""
     problem = posed(schedule, "ranks")
-    found = dict(by_layers(problem, aim))
+    found = {f"{ask.__name__}, {n}": v for ask in (by_aims, by_goals) for n, v in ask(problem, aim)}
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
-    layers = graph_of(problem, moves=True).decisions
-    assert layers.given
-    assert not len(layers.given_costs)
-    with pytest.raises(ProblemError, match="it ranks the choices of a move"):
-        seqopt.solve(problem.but(goals="sum"))
+    graph = graph_of(problem, aim)
+    given = [graph.values(level, state) for level, state in graph.space.without_choice()]
+    assert given
+    assert all(within.all() and not values.any() for values, within in given)
+
+
+@pytest.mark.parametrize("formulation", ["overlap_dp", "path_dp", "flow_mip", "schedule_search"])
+def test_the_least_sum_of_ranks_of_the_arch_is_one_number(formulation):
+    plan = seqopt.optimize("arch25", criterion="equations-2-3", formulation=formulation, aim="sum")
+    assert plan.objective == {"sum": pytest.approx(657.4645627239565, rel=1e-12)}
+    assert plan.status == "optimal"
 
 
 def test_a_given_step_that_the_criterion_forbids_leaves_no_plan():
-    """With one brick no grip is open: layers and states say so alike."""
+    """With one brick no grip is open."""
 
     def several(responses, bricks):
         return np.full_like(responses["F_largest"], 1.0 if bricks > 1 else np.inf)
 
     problem = posed("three-robot")
-    assert graph_of(problem, moves=True).decisions.given[0].bricks == 1
+    assert problem.schedule.steps[0].bricks == 1
+    assert not problem.schedule.steps[0].moves
     problem = problem.but(criterion=StepCost("several", ("F_largest",), several))
-    with pytest.raises(InfeasibleError, match=r"criterion several: step 1, where no grip is left"):
-        seqopt.solve(problem, "overlap_dp")
-    with pytest.raises(InfeasibleError, match="schedule: criterion several allows no plan"):
-        seqopt.solve(problem.but(goals="sum"))
+    for asked, name in ((problem, "overlap_dp"), (problem.but(goals="sum"), None)):
+        with pytest.raises(InfeasibleError, match="schedule: criterion several allows no plan"):
+            seqopt.solve(asked, name)
 
 
 def ways(scene, steps):
@@ -146,58 +150,44 @@ def ways(scene, steps):
     return total
 
 
-@pytest.mark.parametrize("schedule", ["modified-sequential"])
+@pytest.mark.parametrize("schedule", ["modified-sequential", "two-robot"])
 def test_travel_is_one_number(schedule):
-    """The least that layers and states say, and what a budget says that each plan goes."""
+    """The least that a goal says, and what a budget says that each plan goes."""
     problem = posed(schedule)
-    layers, scene = graph_of(problem, moves=True).decisions, problem.scene
-    budget = travel(layers, np.inf)
+    scene, goes = problem.scene, graph_of(problem.but(goals="travel"))
     least = seqopt.solve(problem.but(goals="travel"))
-    goes = states_of(problem.but(goals="travel"))
-    capped = replace(layers, budgets=(replace(budget, bound=least.objective["travel"]),))
+    assert ways(scene, least.steps) == pytest.approx(least.objective["travel"])
+    capped = problem.but(budgets=f"travel={least.objective['travel']!r}m")
     for name in ("labels", "overlap_mip"):
         plan = seqopt.solve(capped, name)
-        assert budget.spent(plan.choice) == pytest.approx(least.objective["travel"], rel=1e-6)
-        assert ways(scene, plan.steps) == pytest.approx(budget.spent(plan.choice))
-        assert plan_values(goes, plan.steps)[0] == pytest.approx(budget.spent(plan.choice))
-    assert ways(scene, least.steps) == pytest.approx(least.objective["travel"])
-    rng = np.random.default_rng(1)
-    for _ in range(5):  # any choice, whatever it costs
-        choice = [int(rng.integers(len(move.candidates))) for move in layers.schedule.moves]
-        nodes = dict(enumerate(layers.nodes(choice)))
-        grips = [
-            tuple(nodes[g.move] if hasattr(g, "move") else g for g in step.grips)
-            for step in layers.schedule.steps
-        ]
-        steps = [replace(least.steps[0], grips=each) for each in grips]
-        assert budget.spent(choice) == pytest.approx(ways(scene, steps))
-
-
-def test_ways_between_moves_that_are_not_neighbors_are_refused():
-    """They were left out, so that any budget was kept."""
-    with pytest.raises(ProblemError, match="from the grip of move 1 to that of move 3"):
-        travel(graph_of(posed("two-robot"), moves=True).decisions, 1.0)
-    assert seqopt.solve(posed("two-robot").but(goals="travel")).objective["travel"] > 0
+        assert plan.objective["travel"] == pytest.approx(least.objective["travel"], rel=1e-6)
+        assert ways(scene, plan.steps) == pytest.approx(plan.objective["travel"])
+        assert plan_values(goes, plan.steps)[0] == pytest.approx(plan.objective["travel"])
+    rng, seen = np.random.default_rng(1), 0
+    while seen < 5:  # any choice, whatever it costs
+        nodes = [int(rng.choice(move.candidates)) for move in problem.schedule.moves]
+        with suppress(StepError):  # two robots at one node
+            steps = problem.schedule.fill(nodes)
+            assert plan_values(goes, steps)[0] == pytest.approx(ways(scene, steps))
+            seen += 1
 
 
 @pytest.mark.parametrize("schedule", SCHEDULES[1:2])
 def test_steps_over_a_level_are_those_of_the_plan(schedule):
     """Steps without an open grip count, as in the table of the plan."""
     problem = posed(schedule)
-    layers = graph_of(problem, moves=True).decisions
-    free = seqopt.solve(layers, "overlap_dp")
-    known = of_table(free.responses(), "T_max")
+    known = of_table(seqopt.solve(problem, "overlap_dp").responses(), "T_max")
     apart = np.unique(np.round(known, 3))
     for k in (0, len(apart) // 2, len(apart) - 2):
         level = float(0.5 * (apart[k] + apart[k + 1]))  # far from any value
-        budget = steps_over(layers, "T_max", level, np.inf)
-        assert budget.spent(free.choice) == (known > level).sum()
-        capped = replace(layers, budgets=(replace(budget, bound=budget.spent(free.choice) - 1),))
+        budget, many = f"steps_over:T_max={level:g}", int((known > level).sum())
         for name in ("labels", "overlap_mip"):
+            free = seqopt.solve(problem.but(budgets=f"{budget}:{many}"), name)
+            assert (of_table(free.responses(), "T_max") > level).sum() == free.objective[budget]
             with suppress(InfeasibleError):
-                plan = seqopt.solve(capped, name)
+                plan = seqopt.solve(problem.but(budgets=f"{budget}:{many - 1}"), name)
                 over = of_table(plan.responses(), "T_max") > level
-                assert budget.spent(plan.choice) == over.sum() <= capped.budgets[0].bound
+                assert plan.objective[budget] == over.sum() <= many - 1
 
 
 # one question in other words: as a criterion, a response, an amount or a filter of one's own
@@ -236,7 +226,7 @@ def test_a_response_is_one_number_in_all_words(free, aim):
         for name in exact()[: None if goals == words else 1]
     }
     if not free:
-        found |= dict(by_layers(problem, aim))
+        found |= dict(by_aims(problem, aim))
     assert len(found) > 5
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
 
@@ -268,9 +258,9 @@ def test_a_largest_force_is_one_bound_in_all_words(free):
     if free:
         asked["payload"] = in_scene(free, most).but(goals="D_max")
     else:
-        asked["layers"] = problem.but(criterion=costs, goals=())
+        asked["no goals"] = problem.but(criterion=costs, goals=())
     found = {
-        name: seqopt.solve(each, "minimax" if name == "layers" else None).certificate.objective
+        name: seqopt.solve(each, "minimax" if name == "no goals" else None).certificate.objective
         for name, each in asked.items()
     }
     assert found == pytest.approx(dict.fromkeys(found, found["limit"]), rel=1e-6)

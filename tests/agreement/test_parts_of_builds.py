@@ -20,9 +20,9 @@ from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order
+from seqopt.sequence.part import Part
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Site, StepKind
-from seqopt.workflow import Part
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 

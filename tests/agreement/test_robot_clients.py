@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.exchange._tasks import FRAMES, plan_tasks
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange.exports import export
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import METHODS
 from tests.builders import ROOT, six_bricks
@@ -24,7 +24,7 @@ TASKS = [*plan_tasks(SCENE, STEPS)]
 
 
 def opened(form, **more):
-    return compas.json_loads(export_plan(SCENE, STEPS, form, **more))
+    return compas.json_loads(export(SCENE, STEPS, form, **more))
 
 
 def same(theirs, mine):
@@ -72,7 +72,7 @@ def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypa
 
 
 def test_pandas_has_a_row_for_every_task():
-    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv")))
+    table = pd.read_csv(io.StringIO(export(SCENE, STEPS, "tasks_csv")))
     assert [*table["action"]] == [task.action.value for task in TASKS]
     for name in FRAMES:
         known = [getattr(task, name) for task in TASKS]

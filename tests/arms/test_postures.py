@@ -119,8 +119,14 @@ def test_a_table_is_the_same_each_time_in_any_order_and_from_a_folder(scene, tab
     (file,) = tmp_path.iterdir()
     assert _stored_table(tmp_path, site, lambda: pytest.fail("computed again")) == table
     assert find_postures(in_order(scene, "reversed")) is table
-    file.write_bytes(file.read_bytes()[:-50])  # damaged
-    assert _stored_table(tmp_path, site, lambda: table) is table
+    whole = file.read_bytes()
+    locked = bytearray(whole)
+    for mark, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):  # as if it had a password
+        for at in [k for k in range(len(whole)) if whole.startswith(mark, k)]:
+            locked[at + flags] |= 1
+    for damaged in (whole[:-50], bytes(locked)):
+        file.write_bytes(damaged)
+        assert _stored_table(tmp_path, site, lambda: table) is table
 
 
 def test_search_and_judge_ask_the_table_in_two_ways(tight):

@@ -11,12 +11,12 @@ import pytest
 import seqopt
 from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
-from seqopt._cli.outputs import task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange.exports import export
+from seqopt.report._folders import task_files
 from seqopt.report._robots import _known_arms
 from tests.arms.scenes import TOOL, beside, two_arms
 
@@ -71,9 +71,7 @@ def folder(plan, tmp_path_factory):
 
 @pytest.mark.parametrize(("form", "name"), [("tasks", "tasks.json"), ("tasks_csv", "tasks.csv")])
 def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, capsys):
-    assert task_files(plan)[name] == export_plan(
-        plan.engine.network.scene, read_folder(folder)[1], form
-    )
+    assert task_files(plan)[name] == export(plan.engine.network.scene, read_folder(folder)[1], form)
     out = folder / name
     words = ["export", str(folder), "--format", form, "--out", str(out)]
     assert main([*words, "--cache", str(folder / "postures")]) == 0

@@ -20,7 +20,6 @@ from seqopt.arms._permits import permits
 from seqopt.arms._urdf import model_path
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, GripError, SceneError, StepError
-from seqopt.plan.pose import graph_of
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
@@ -276,10 +275,10 @@ def test_the_loop_agrees_with_brute_force(aim):
     scene = soft()
     engine = make_engine("compliance", scene)
     problem = seqopt.pose(engine, three_robot_loop(engine.network), FORCE, aim)
-    layers, known, values = graph_of(problem, moves=True).decisions, {}, []
-    for choice in product(*(range(len(move.candidates)) for move in layers.schedule.moves)):
+    schedule, known, values = problem.schedule, {}, []
+    for nodes in product(*(move.candidates for move in schedule.moves)):
         try:
-            steps = layers.steps(choice)
+            steps = schedule.fill(nodes)
             check_postures(scene, steps)
         except StepError:
             continue

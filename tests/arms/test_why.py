@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.arms import _tables, find_postures
-from seqopt.arms._permits import reach_table
+from seqopt.arms._permits import reach
 from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._tables import _known
 from seqopt.scene.parts import Sphere
@@ -26,7 +26,7 @@ TOP = {"faces": ("thickness",)}
 
 def reasons(scene):
     """Why no posture is possible, by node, where there is none."""
-    rows = reach_table(scene)
+    rows = reach(scene)
     assert ((rows["to_bricks"] == 0) == (rows["why"] != "")).all()
     return {node: why for node, why in zip(rows["node"], rows["why"], strict=True) if why}
 

@@ -56,8 +56,7 @@ def test_python_and_the_command_line_answer_alike(capsys, arch, words, given):
 def test_pareto_and_replan_are_what_python_finds(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
-    asked = {"schedule": "free", "aim": "F_largest,steps", "rules": "least_grips=1"}
-    front = seqopt.find_front(seqopt.optimize(arch, **asked).problem)
+    front = seqopt.pareto(arch, aim="F_largest,steps", rules="least_grips=1")
     assert [row["F_largest"] for row in found] == [*front.table["F_largest"]]
     plan, folder = seqopt.optimize(arch, "free"), tmp_path / "p"
     assert main(["optimize", str(arch), "--schedule", "free", "--out", str(folder)]) == 0
@@ -68,6 +67,10 @@ def test_pareto_and_replan_are_what_python_finds(capsys, arch, tmp_path):
     part = seqopt.Part(schedule="free", begin=begin, lost=["rob3"])
     rest = seqopt.optimize(arch, part, rules=["least_grips=1"])
     assert [row["step"] for row in again] == [step.number for step in rest.steps]
+    for given in (plan, folder):
+        new = seqopt.replan(given, 4, lost=["rob3"], rules=["least_grips=1"])
+        assert new.steps == rest.steps
+    assert plan.replan(4, lost=["rob3"], rules="least_grips=1").changes == new.changes
     with pytest.raises(seqopt.SeqoptError, match=r"^missing 2: a build that goes on"):
         seqopt.optimize(arch, seqopt.Part(schedule="free", missing=[2]))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -18,7 +17,8 @@ import pytest
 from seqopt import workflow
 from seqopt._cli.answer import Status
 from seqopt._cli.main import main
-from seqopt.plan import _answers as paths
+from seqopt.graph.formulation import Finding
+from seqopt.plan import _states as states
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.workflow import _parse_size
 from tests.builders import ROOT, small_arch
@@ -59,13 +59,9 @@ def test_sizes(text, size):
 
 def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
     out = ["--out", str(tmp_path / "out")]
-    assert main([*WORDS, "overlap_dp", *out, "--max-memory", "100kB"]) == 4
-    err = capsys.readouterr().err
-    assert re.fullmatch(
-        r"seqopt: out of memory: the responses of all choices take about [0-9.e-]+ GB, and "
-        r"0\.0001 GB may be used; .*search without proof\n",
-        err,
-    )
+    assert main([*WORDS, "overlap_dp", *out, "--max-memory", "100kB"]) == 2
+    said = "--option max_memory: it is too little to find a plan; give more"
+    assert capsys.readouterr().err == f"seqopt: error: {said}\n"
     assert not (tmp_path / "out").exists()
 
 
@@ -95,9 +91,9 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
     """As ctrl-C at the first finding; what is written is whole."""
     came = []
 
-    def interrupt(_):  # in the place of what shows how far it is
-        came.append(1)
-        if len(came) == 1:
+    def interrupt(found):  # in the place of what shows how far it is
+        if isinstance(found, Finding) and not came:
+            came.append(found)
             signal.raise_signal(signal.SIGINT)
 
     real = workflow.Run
@@ -119,13 +115,13 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
 
 def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
     """One plan that was interrupted does not let the next begin."""
-    selected = paths._selected
+    selected = states._selected
 
-    def interrupted(instance, formulation, run, watch, *more):
-        watch.interrupt()
-        return selected(instance, formulation, run, watch, *more)
+    def interrupted(formulation, problem, options, run):
+        options["watch"].interrupt()
+        return selected(formulation, problem, options, run)
 
-    monkeypatch.setattr(paths, "_selected", interrupted)
+    monkeypatch.setattr(states, "_selected", interrupted)
     assert main(["compare"]) == 130
     assert capsys.readouterr().err == "seqopt: interrupted\n"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +12,10 @@ import pytest
 
 import seqopt
 from seqopt._cli.answer import Status
-from seqopt._cli.commands.analyze import _fault, _status_of
+from seqopt._cli.commands.analyze import _status_of
 from seqopt._cli.main import main
 from seqopt.errors import MechanismError, SolverError
+from seqopt.responses._faults import _fault
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.methods import sequential
@@ -146,13 +146,14 @@ def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path
     assert pd.read_csv(out)["finding"].notna().any()
 
 
-def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)  # choosing alone is late
-    words = ("--formulation", "overlap_dp", "--time-limit", "0", "--no-stability")
+def test_a_time_limit_ends_a_search_whose_choices_are_in_a_trace(tmp_path, capsys):
+    words = ("--formulation", "labels", "--budget", "travel=0.9", "--no-stability")
     words = (*words, "--out", str(tmp_path / "a"))
-    assert main(["optimize", "arch25", *words]) == 0
+    assert main(["optimize", "arch25", *words, "--time-limit", "0"]) == 4
+    assert "time is over: no plan was found yet; give more" in capsys.readouterr().err
+    assert main(["optimize", "arch25", *words, "--time-limit", "3600"]) == 0
     found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
-    assert (found["ended"], found["status"]) == ("stopped", "feasible")
+    assert (found["ended"], found["status"]) == ("done", "optimal")
     trace = pd.read_csv(tmp_path / "a" / "trace.csv")
     assert list(trace.columns) == ["seconds", "objective", "bound", "gap"]
     assert trace["objective"].iloc[-1] == pytest.approx(found["objective"]["sum"], rel=1e-5)
@@ -238,7 +239,7 @@ def test_every_engine_goes_on_after_a_mechanism(capsys, tmp_path, engine):
 def test_a_failed_solver_is_a_mechanism_only_where_one_is_proven():
     network = seqopt.build_network(load_scene(ARCH))
     steps, failed = seqopt.sequential(network), SolverError("step: not at rest")
-    verdicts = [found.verdict.value for found in seqopt.assess_steps(network, steps, "dry")]
+    verdicts = [found.verdict.value for found in seqopt.assess(network, steps, "dry")]
     falls, stands = steps[verdicts.index("does not stand")], steps[verdicts.index("stands")]
     dry = seqopt.make_engine("discrete", network, seqopt.DRY)
     found = _fault(dry, falls, failed)

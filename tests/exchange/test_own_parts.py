@@ -17,7 +17,7 @@ import seqopt
 from experiments.harness.scenes import running_bond
 from seqopt._registry import ADDED
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError
-from seqopt.exchange import Content, FileBlock, Format, export_plan, import_scene
+from seqopt.exchange import Content, FileBlock, Format, export, import_scene
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import DOCUMENTS as READERS
@@ -64,9 +64,9 @@ def test_a_format_of_ones_own_is_read_and_written(path):
     scene = import_scene(path, given=GIVEN)
     assert scene.bricks[0].mass == pytest.approx(2000.0 * 0.4 * 0.2 * 0.1)
     steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("chain:bricks=7")))
-    assert export_plan(scene, steps, "corners") == f"{len(steps)}\n"
+    assert export(scene, steps, "corners") == f"{len(steps)}\n"
     with pytest.raises(StepError, match="format corners takes no distance; leave it out"):
-        export_plan(scene, steps, "corners", distance=0.1)
+        export(scene, steps, "corners", distance=0.1)
 
 
 def test_what_a_function_of_others_returns_wrong_is_one_line(path):
@@ -74,7 +74,7 @@ def test_what_a_function_of_others_returns_wrong_is_one_line(path):
     with pytest.raises(SceneError, match=r"format corners: it reads \[1\]; return a Content"):
         import_scene(path, given=GIVEN)
     with pytest.raises(StepError, match="format corners: it writes None; return a text"):
-        export_plan(seqopt.load_scene("arch25"), (), "corners")
+        export(seqopt.load_scene("arch25"), (), "corners")
 
 
 def test_names_that_are_taken_are_refused_by_kind():
@@ -99,7 +99,7 @@ def first_step(scene):
 def written(scene, form, folder):
     """A scene as a file of a format."""
     path = folder / f"scene.{ENDS[form]}"
-    path.write_text(export_plan(scene, first_step(scene), form), encoding="utf-8")
+    path.write_text(export(scene, first_step(scene), form), encoding="utf-8")
     return path
 
 

@@ -19,7 +19,7 @@ from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._content import Given
 from seqopt.exchange._grip_frames import hold
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.scene._armed import PlanPostures
@@ -183,7 +183,7 @@ def sources(tmp_path):
 def test_an_assembly_keeps_all_and_gains_the_plan(sources):
     path, scene = sources("assembly")
     steps = METHODS["sequential"](build_network(scene), ())
-    whole = json.loads(export_plan(scene, steps, "compas_assembly", path))
+    whole = json.loads(export(scene, steps, "compas_assembly", path))
     graph = whole["data"]["graph"]["data"]
     assert [graph["node"][key].get("order") for key in ("0", "4", "7")] == [None, 0, 1]
     before = DOCUMENTS["assembly"]["data"]["graph"]["data"]["node"]["4"]
@@ -200,16 +200,16 @@ def test_an_assembly_keeps_all_and_gains_the_plan(sources):
 def test_what_does_not_fit_is_refused(sources, tmp_path):
     path, _ = sources("assembly")
     with pytest.raises(StepError, match="format is 'xml'; give one of tasks"):
-        export_plan(SCENE, STEPS, "xml")
+        export(SCENE, STEPS, "xml")
     with pytest.raises(StepError, match=r"give the assembly that was imported \(--source\)"):
-        export_plan(SCENE, STEPS, "compas_assembly")
+        export(SCENE, STEPS, "compas_assembly")
     with pytest.raises(StepError, match="takes no source"):
-        export_plan(SCENE, STEPS, "tasks", path)
+        export(SCENE, STEPS, "tasks", path)
     with pytest.raises(StepError, match="the source has no block 1"):
-        export_plan(SCENE, STEPS, "compas_assembly", path)
+        export(SCENE, STEPS, "compas_assembly", path)
     meshes, _ = sources("meshes")
     with pytest.raises(SceneError, match="an object is expected"):
-        export_plan(SCENE, STEPS, "compas_assembly", meshes)
+        export(SCENE, STEPS, "compas_assembly", meshes)
 
 
 # blocks that interpenetrate, or stand there twice, are named and never pass in silence

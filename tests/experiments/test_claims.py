@@ -91,6 +91,8 @@ def test_a_module_that_claims_and_declares_nothing_is_an_error(monkeypatch, caps
     monkeypatch.setattr(harness, "modules", lambda: {"scenes": (helper, "")})
     with pytest.raises(ClaimError, match=f"{helper} declares no CLAIM"):
         find_claim("scenes")
+    assert main(["--help"]) == 0
+    assert "python -m experiments NAME" in capsys.readouterr().out
     assert main(["perrs"]) == 1
     assert "perrs: there is no such experiment; give one of scenes" in capsys.readouterr().err
 

@@ -14,17 +14,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from experiments.harness.layers import Budget, LayeredCosts
 from formulations import rank_search
 from formulations.choice import Choice
 from formulations.flow import OVERLAP_MIP
 from formulations.on_graph import on_graph
 from formulations.solvers import minimize_by_highs
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.graph.decisions import pose_decisions, steps_over, travel
 from seqopt.graph.formulation import (
     GROUP,
     End,
+    Finding,
     FormulationKind,
     Watch,
     exhibits,
@@ -35,7 +35,7 @@ from seqopt.graph.graph import Graph
 from seqopt.problem.problem import Aim
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.builders import small_arch
-from tests.layered import Costs, answer
+from tests.layered import Costs, answer, of_layers
 from tests.strategies import budgeted, problems
 
 SHOWN = formulations("costs")  # what comparisons have
@@ -78,7 +78,8 @@ def test_answers_are_certified_or_refused_as_infeasible(name, aim, problem):
         with pytest.raises(InfeasibleError, match="move"):
             answer(problem, name, aim=aim)
         return
-    assert aim.costs(problem).least(aim) == pytest.approx(best)
+    costs = problem.sums if aim is Aim.SUM else problem.peaks
+    assert costs.least(aim) == pytest.approx(best)
     found = answer(problem, name, aim=aim)
     proof = found.certificate
     assert found.objective == proof.objective == problem.worth(found.choice, aim)
@@ -152,7 +153,7 @@ def test_budgets_are_kept_or_refused(name):
         with pytest.raises(InfeasibleError, match="budgets"):
             answer(impossible, name)
     else:
-        with pytest.raises(ProblemError, match="budget 'use' couples all moves"):
+        with pytest.raises(ProblemError, match="takes no caps"):
             answer(capped, name)
 
 
@@ -195,36 +196,49 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
 
 @timely
 def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
-    plan = seqopt.solve(problem25, ALL[name], time_limit=0)
+    """Of costs that are known; where states are still to be visited there is no plan yet."""
+    one = seqopt.compile_instance(problem25, aim=ALL[name].aim)
+    plan = seqopt.solve(one, ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED
     if name in OURS:
         assert plan.certificate.gap < 0.3
     assert plan.selection.bound[0] <= plan.certificate.bound + 1e-6
 
 
+def once():
+    """A receiver of findings that interrupts with the first one; a second would end the program."""
+    came = []
+
+    def interrupt(told):
+        if isinstance(told, Finding):
+            if not came:
+                signal.raise_signal(signal.SIGINT)
+            came.append(told)
+
+    return interrupt, came
+
+
 @timely
 def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, problem8):
-    """It comes with the first finding; a second one would end the program."""
-    formulation, came = ALL[name], []
-    problem = problem8
-    best = seqopt.solve(problem, "overlap_dp")
-    if formulation.takes_budgets:
-        way = travel(problem, np.inf)
-        way = replace(way, bound=0.95 * way.spent(best.choice))
-        problem = replace(problem, budgets=(way,))
-
-    def interrupt(finding):
-        if not came:
-            signal.raise_signal(signal.SIGINT)
-        came.append(finding)
-
-    plan = seqopt.solve(problem, formulation, progress=interrupt)
+    formulation, (interrupt, came) = ALL[name], once()
+    best = seqopt.solve(problem8, "overlap_dp")
+    problem = problem8.but(budgets="travel=0.95") if formulation.takes_budgets else problem8
+    one = seqopt.compile_instance(problem, aim=formulation.aim)
+    plan = seqopt.solve(one, formulation, progress=interrupt)
     assert plan.ended is End.INTERRUPTED
     assert plan.trace == tuple(came)
     assert plan.selection.bound[0] <= plan.certificate.objective + 1e-6
     if formulation.aim is Aim.SUM:
         assert plan.certificate.objective >= best.certificate.objective - 1e-6
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("name", ["labels", "overlap_lp", "overlap_mip"])
+def test_an_interrupt_is_said_though_the_search_may_have_ended(name, problem8):
+    interrupt, came = once()
+    plan = seqopt.solve(problem8.but(budgets="travel=0.95"), name, progress=interrupt)
+    assert plan.ended is End.INTERRUPTED
+    assert plan.trace == tuple(came)
 
 
 def test_where_no_path_is_found_yet_its_bound_is_said(problem25):
@@ -234,20 +248,17 @@ def test_where_no_path_is_found_yet_its_bound_is_said(problem25):
         watch.tell(bound=612.5)
         return Choice((), (612.5,), stopped=True)
 
-    def once():
-        came = []
-        return lambda _: came or (came.append(1), signal.raise_signal(signal.SIGINT))
-
     late = on_graph("late", "finds nothing in time", choose, aim=Aim.SUM, takes_budgets=True)
-    budgets = (travel(problem25, 13.0), steps_over(problem25, "F_largest", 300.0, 1.0))
-    capped, told = replace(problem25, budgets=budgets), r"no path was .* \(no path is below 612.5\)"
+    capped = problem25.but(budgets=["travel=13m", "steps_over:F_largest=300:1"])
+    one, told = seqopt.compile_instance(capped), r"no path was .* \(no path is below 612.5\)"
     with pytest.raises(TimeUpError, match=told):
-        seqopt.solve(capped, late)
+        seqopt.solve(one, late)
     with pytest.raises(KeyboardInterrupt, match=told):
-        seqopt.solve(capped, late, progress=once())
-    plan = seqopt.solve(capped, "labels", progress=once())
+        seqopt.solve(one, late, progress=once()[0])
+    plan = seqopt.solve(capped, "labels", progress=once()[0])
     assert plan.ended is End.INTERRUPTED
-    assert all(b.spent(plan.choice) <= b.bound for b in budgets)
+    assert plan.objective["travel"] <= 13
+    assert plan.objective["steps_over:F_largest=300"] <= 1
 
 
 def agrees(problem, name):
@@ -296,21 +307,22 @@ def valued(problem, name, **options):
 @pytest.fixture(scope="module")
 def problem8():
     engine = seqopt.make_engine("compliance", small_arch(8))
-    return pose_decisions(engine, seqopt.three_robot_loop(engine.network), EQUATIONS)
+    return seqopt.pose(engine, seqopt.three_robot_loop(engine.network), EQUATIONS)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     engine, count = seqopt.make_engine("compliance", small_arch(5)), 5
-    problem = pose_decisions(engine, seqopt.three_robot_loop(engine.network), criterion)
+    problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), criterion)
     best = valued(problem, "rank_search", horizon=count)
-    assert best == pytest.approx(Costs(problem.sums).best())
+    costs = of_layers(problem)
+    assert best == pytest.approx(costs.best())
     for name in EXACT_SUMS:
         assert valued(problem, name) == pytest.approx(best, rel=1e-6)
-    assert valued(problem, "minimax") == pytest.approx(Costs(problem.peaks).best(Aim.PEAK))
+    assert valued(problem, "minimax") == pytest.approx(costs.best(Aim.PEAK))
 
 
-# what exact formulations share: how programs are solved, read and bounded, costs of any sign
+# what exact formulations share: how programs are solved, read and bounded
 
 
 PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
@@ -318,7 +330,7 @@ EXACT = PROGRAMS | {n: find_formulation(n) for n in ("overlap_dp", "overlap_lp",
 
 
 def costs_of(lowest, seed=0):
-    """Random costs of three moves, some below zero if the lowest is."""
+    """Random costs of three moves, from the lowest on."""
     rng = np.random.default_rng(seed)
     sizes = (3, 4, 2)
     single = tuple(rng.uniform(lowest, 9.0, size) for size in sizes)
@@ -326,7 +338,7 @@ def costs_of(lowest, seed=0):
     return LayeredCosts(single, (np.zeros((1, sizes[0])), *shared))
 
 
-@pytest.mark.parametrize("lowest", [-9.0, 1.0])
+@pytest.mark.parametrize("lowest", [0.0, 1.0])
 @pytest.mark.parametrize("name", EXACT)
 def test_the_choice_and_its_bound_are_the_least(name, lowest):
     costs, aim, told = Costs(costs_of(lowest)), EXACT[name].aim, []
@@ -341,7 +353,7 @@ def test_the_choice_and_its_bound_are_the_least(name, lowest):
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(name):
-    costs, aim = Costs(costs_of(-9.0)), PROGRAMS[name].aim
+    costs, aim = Costs(costs_of(0.0)), PROGRAMS[name].aim
     found = answer(costs, name, time_limit=0.0)
     assert found.stopped == "time"
     assert found.bound <= costs.best(aim) + 1e-9

@@ -340,7 +340,7 @@ def test_a_margin_is_that_of_the_worst_step_to_two_percent(aim, way):
     found, bound = plan.objective[aim], plan.summary()["bound"][aim]
     assert plan.certificate.gap == pytest.approx(abs(found - bound) / found)
     assert plan.certificate.gap <= NARROW * (1 + 1e-9)
-    steps = seqopt.assess_steps(engine.network, plan.steps, "dry", "all")
+    steps = seqopt.assess(engine.network, plan.steps, "dry", "all")
     worst = {
         "bond": max(step.bond for step in steps),
         "friction": max(step.friction for step in steps),

@@ -12,6 +12,8 @@ import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import LabelProof
+from seqopt.graph.states.explored import explore
+from seqopt.plan.pose import graph_of
 from seqopt.problem import Resource
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
@@ -86,11 +88,13 @@ def test_plans_keep_it_and_are_proven(space):
 @pytest.mark.parametrize("space", AIMS)
 def test_no_path_that_keeps_it_is_better(space):
     """By a graph of its own, of states with how warm the tool is, and the least of all paths."""
-    one = seqopt.compile_instance(posed(space))
-    rows, amounts = one.states[:, 1:].tolist(), one.amounts[:, 0].tolist()
+    found = explore(graph_of(posed(space)))
+    one, states = found.graph()
+    rows = [row[1:] for _, key, own in states for row in found.space.rows(key, own).tolist()]
+    moves = one.source.tolist(), one.target.tolist(), one.amounts[:, 0].tolist()
     least = {(0, 0.0): 0.0}
-    for _ in range(int(one.states[:, 0].max()) * 3 + 3):
-        for s, t, amount in zip(one.source.tolist(), one.target.tolist(), amounts, strict=True):
+    for _ in range(len(states) * 3 + 3):
+        for s, t, amount in zip(*moves, strict=True):
             for now in range(MOST[space] + 1):
                 then = heated(now, rows[s], rows[t])
                 if (s, now) in least and then <= MOST[space]:

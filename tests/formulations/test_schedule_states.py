@@ -14,7 +14,7 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
+from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph.states.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
@@ -154,14 +154,16 @@ def test_budgets_equal_brute_force(name):
 
 
 def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
-    """The control: no prices, wrong prices and a bound that is too high are seen."""
+    """The control: a bound that is too high is seen; wrong multipliers prove no more or less."""
     engine, schedule = built("four")
     problem = within(build_states(engine, schedule, ONES, "sum"), {"travel": 3.0})
     plan = seqopt.solve(problem, SEARCH)
-    judge_schedule(problem, plan.selection, plan.steps)
+    proof = judge_schedule(problem, plan.selection, plan.steps)
+    for prices in ((), ((1e3,),)):  # the judge finds its own
+        again = judge_schedule(problem, replace(plan.selection, prices=prices), plan.steps)
+        assert again.bounds == pytest.approx(proof.bounds)
     for wrong, said in (
-        (replace(plan.selection, prices=()), "no multiplier for every budget"),
-        (replace(plan.selection, prices=((1e3,),)), "no plan within budgets is promised below"),
+        (replace(plan.selection, prices=((),)), "no multiplier for every budget"),
         (replace(plan.selection, bound=(2 * plan.selection.bound[0], 0.0)), "is promised below"),
     ):
         with pytest.raises(SolverError, match=said):
@@ -234,5 +236,5 @@ def test_many_open_grips_at_once_are_solved_as_states():
     plans = [seqopt.solve(seqopt.pose(engine, schedule, ONES), n) for n in (None, "minimax")]
     assert [plan.goals for plan in plans] == [("minmax",)] * 2
     assert plans[1].objective["minmax"] == pytest.approx(plans[0].objective["minmax"])
-    with pytest.raises(ProblemError, match="ranks the choices of a move"):
+    with pytest.raises(StepError, match="at most two neighboring ones can be; take worst-ratio"):
         build_states(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")

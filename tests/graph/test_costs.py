@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+from experiments.harness.layers import Budget, LayeredCosts
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, is_beyond, within_budgets
-from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.paths import _sum_bound, distances, lexicographic_bounds, reached
 from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds

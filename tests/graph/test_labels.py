@@ -9,17 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.harness.layers import best_in_order
 from formulations.states._search import _Totals
 from seqopt.graph import Graph
 from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, widening
-from seqopt.graph.decision_costs import best_in_order
-from seqopt.graph.decisions import Windows, pose_decisions
 from seqopt.graph.formulation import Watch
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
+from seqopt.graph.states.walk import _branches
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
 from seqopt.study.published import EQUATIONS
+from tests.layered import of_layers
 from tests.random_graphs import graphs, simple_paths
 
 NONE = LabelSearch(None, np.inf, -np.inf)
@@ -152,15 +154,23 @@ def test_rows_are_ranked_as_if_alone(rows):
 
 
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25):
-    problem = pose_decisions(engine25, loop25, CONDITIONAL)
+    problem = pose(engine25, loop25, CONDITIONAL)
     choice = solve(problem, "cascade").choice
-    windows = Windows(problem, [*choice])
-    for k in range(len(choice)):
-        before = choice[k - 1] if k else 0
-        charged = problem.sums.single[k] + problem.sums.shared[k][before]
+    assert solve(problem, "cascade", proof=False).choice == choice
+    costs, states = of_layers(problem).sums, graph_of(problem)
+    state, level, before = states.space.start(), 0, 0
+    for k, now in enumerate(choice):
+        charged = costs.single[k] + costs.shared[k][before]
+        assert charged[now] == charged.min()
+        branches, trail = _branches(states, level, state)
+        if len(branches) == 1:  # a step that is forced
+            state, level = trail[-1], level + len(trail)
+            branches, trail = _branches(states, level, state)
         allowed = np.isfinite(charged)
-        np.testing.assert_allclose(charged[allowed], windows.costs(k)[allowed])
-        assert charged[choice[k]] == charged.min()
+        np.testing.assert_allclose(charged[allowed], branches)
+        row = np.flatnonzero(allowed).tolist().index(now)
+        state, level, before = trail[-1][[row]], level + len(trail), now
+    assert level == states.space.levels
 
 
 def conditional(problem):
@@ -172,10 +182,11 @@ def conditional(problem):
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
     cascade, other = solve(problem25, "cascade"), conditional(problem25)
-    assert problem25.sums.cost(cascade.choice) == pytest.approx(663.81, abs=0.01)
-    assert other.sums.cost(cascade.choice) == pytest.approx(664.5)
+    own, sums = of_layers(problem25).sums, of_layers(other).sums
+    assert own.cost(cascade.choice) == pytest.approx(663.81, abs=0.01)
+    assert sums.cost(cascade.choice) == pytest.approx(664.5)
     exact = solve(other, "overlap_dp")
     assert exact.certificate.objective == pytest.approx(656.025)
     assert solve(other, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
-    sighted = best_in_order([(other.sums, Aim.SUM), (problem25.sums, Aim.SUM)])
-    assert problem25.sums.cost(sighted) == pytest.approx(663.81, abs=0.01)
+    sighted = best_in_order([(sums, Aim.SUM), (own, Aim.SUM)])
+    assert own.cost(sighted) == pytest.approx(663.81, abs=0.01)

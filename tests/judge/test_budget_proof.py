@@ -13,12 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
+from experiments.harness.layers import Budget, LayeredCosts
 from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph import Explorer
 from seqopt.graph._orders import OrderSpace, among_orders
-from seqopt.graph.decision_costs import Budget, LayeredCosts
-from seqopt.graph.decisions import steps_over, travel
 from seqopt.graph.formulation import End, FormulationKind, formulations
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
@@ -45,13 +44,12 @@ TAKERS = {name: found for name, found in formulations("costs").items() if found.
 
 def bounded(problem, value, claimed):
     """What the judge proves of costs, given the value of a choice and claimed multipliers."""
-    compiled = problem.compiled()
-    instance = compiled.instance
+    instance = problem.compiled().instance
     limited = [(cap.column, cap.most) for cap in instance.caps]
     costs = instance.amounts[:, 0]
     prices = [max(0.0, claimed.get(cap.name, 0.0)) for cap in instance.caps]
-    own = instance.graph, costs, limited, value - compiled.offset
-    return least_within(*own, prices=prices, laid_down=True)[0] + compiled.offset
+    own = instance.graph, costs, limited, value
+    return least_within(*own, prices=prices, laid_down=True)[0]
 
 
 @pytest.mark.parametrize("most", [1, 5_000])
@@ -160,24 +158,24 @@ def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
 
 @pytest.mark.parametrize("peak", [True, False])
 def test_multipliers_bound_what_is_capped_and_others_are_refused(peak):
-    """The cheap way takes two of a cap of one, the dear one nothing."""
+    """The cheap way takes two of a cap of one, the dear one nothing; labels see that of sums."""
     rows, amounts = np.array([[0, 0], [1, 1]], dtype=np.int32), np.array([[1.0, 2.0], [4.0, 0.0]])
     graph = Graph(*rows, amounts, (peak, False), np.array([False, True]))
-    assert budget_bounds(graph, (4.0,), (4.0,), ((1.0,), ((2.0,),))) == pytest.approx(
+    claimed = (4.0 if peak else 1.0,)
+    assert budget_bounds(graph, (4.0,), claimed, ((1.0,), ((2.0,),))) == pytest.approx(
         (4.0 if peak else 2.0,)
     )
-    (proven,) = budget_bounds(graph, (4.0,), (4.0,), ((1.0,), ((0.0,),)))
+    (proven,) = budget_bounds(graph, (4.0,), claimed, ((1.0,), ((0.0,),)))
     assert proven == (-np.inf if peak else 1.0)
+    (proven,) = budget_bounds(graph, (4.0,), (4.0,), ((1.0,), ((0.0,),)))
+    assert proven == (-np.inf if peak else pytest.approx(4.0))
     for none in ((np.nan,), (np.inf,), (1.0, 1.0), ()):
         with pytest.raises(SolverError, match="where 1 numbers belong"):
             budget_bounds(graph, (4.0,), (4.0,), ((1.0,), (none,)))
 
 
 def test_few_labels_stop_with_a_bound(problem25):
-    capped = replace(
-        problem25,
-        budgets=(travel(problem25, 18.0), steps_over(problem25, "F_largest", 250.0, 18.0)),
-    )
+    capped = problem25.but(budgets=["travel=18m", "steps_over:F_largest=250:18"])
     best = solve(capped, "labels")
     assert best.ended is End.DONE
     assert best.certificate.claimed_gap <= 1e-6
@@ -185,11 +183,11 @@ def test_few_labels_stop_with_a_bound(problem25):
     assert few.selection.bound[0] <= best.certificate.objective <= few.certificate.objective
     assert few.ended is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
-    with pytest.raises(ProblemError, match="name it in `also`"):
-        steps_over(problem25, "F_rob9", 100.0, 1.0)
-    tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
+    with pytest.raises(ProblemError, match="F_rob9"):
+        solve(problem25.but(budgets="steps_over:F_rob9=100:1"), "labels")
+    tight = problem25.but(budgets=["travel=11.4m", "steps_over:F_largest=250:18"])
     with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
-        solve(tight, "labels", most=1, time_limit=0)
+        solve(seqopt.compile_instance(tight), "labels", most=1, time_limit=0)
 
 
 def test_labels_prove_only_what_all_of_them_close(monkeypatch):

@@ -14,11 +14,13 @@ import pytest
 
 import seqopt
 from formulations.times._labels import InTime
+from seqopt.graph.states._candidates import CandidateCosts
 from seqopt.graph.states.explored import bisected
 from seqopt.graph.states.states import States
 from seqopt.problem import Amount, Filter, filters
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
 from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._schedule_space import ScheduleSpace
 from tests.brute_force import ONES
 from tests.builders import small_arch
 
@@ -110,10 +112,12 @@ def control(space, amount):
 
 @pytest.mark.parametrize("how", ["a constant added", "another column"])
 @pytest.mark.parametrize(("space", "amount"), [*params(PLAIN)])
-def test_a_corrupted_amount_is_seen(space, amount, how):
+def test_a_corrupted_amount_is_seen(space, amount, how, monkeypatch):
     assert control(space, amount)
     problem = posed(space, amount)
     wrong = corrupted(problem.goals[0], how)
+    if wrong.of_criterion:  # the search asks the criterion itself
+        monkeypatch.setattr(States, "costs", lambda self, level, states: wrong.states(states))
     assert is_refused(replace(problem, goals=(wrong, *problem.goals[1:])))
 
 
@@ -281,6 +285,90 @@ def test_a_state_that_is_left_out_is_missed(space, kind, monkeypatch):
                 return
             assert found(own)[0] == pytest.approx(value, rel=1e-9)
     raise AssertionError("no state of the best plan was missed")
+
+
+# candidates of open grips, whose ranks are those among all of them
+
+
+RANKS = replace(seqopt.CRITERIA["equations-2-3"], name="ranks")
+
+
+@cache
+def ranked():
+    engine = seqopt.make_engine("compliance", small_arch(5))
+    return seqopt.pose(engine, seqopt.three_robot_loop(engine.network), RANKS)
+
+
+@cache
+def best_ranked():
+    return solved(ranked())
+
+
+def test_ranks_that_are_not_attacked_are_proven():
+    assert str(best_ranked().status) == "optimal"
+
+
+def among(monkeypatch, change):
+    """Change costs among candidates in the search; ``change``: of level, states and costs."""
+    own = CandidateCosts.among
+
+    def changed(self, level, states, **how):
+        return change(level, states, own(self, level, states, **how))
+
+    monkeypatch.setattr(CandidateCosts, "among", changed)
+
+
+@pytest.mark.parametrize("shift", [0.5, -0.5])
+def test_a_constant_added_to_candidates_is_seen(shift, monkeypatch):
+    among(monkeypatch, lambda _, __, costs: costs + shift * (costs > 0))
+    assert is_refused(replace(ranked()))
+
+
+def test_ranks_of_other_candidates_are_seen(monkeypatch):
+    own = CandidateCosts._relative
+    monkeypatch.setattr(CandidateCosts, "_relative", lambda *of, **how: own(*of, **how)[::-1])
+    assert is_refused(replace(ranked()))
+
+
+@pytest.mark.parametrize("level", [3, 4, 8])
+def test_ranks_without_a_candidate_are_seen(level, monkeypatch):
+    """One that is possible is not ranked, so that others are less far behind."""
+    own = ScheduleSpace.candidates
+
+    def fewer(self, at):
+        found = own(self, at)
+        if at != level:
+            return found
+        possible = found.possible.copy()
+        possible[np.unravel_index(np.flatnonzero(possible)[0], possible.shape)] = False
+        return found._replace(possible=possible, states=found.states[1:])
+
+    monkeypatch.setattr(ScheduleSpace, "candidates", fewer)
+    assert is_refused(replace(ranked()))
+
+
+def test_a_candidate_that_is_left_out_is_missed(monkeypatch):
+    """Whichever of the best plan: a plan as good is found, or the judge finds a better."""
+    value, met = best_ranked().certificate.values[0], 0
+    for at, *row in best_ranked().selection.states:
+        with monkeypatch.context() as patch:
+
+            def lost(level, states, costs, at=at, row=row):
+                gone = (level == at) & (states == row).all(axis=1)
+                return np.where(gone, np.inf, costs)
+
+            among(patch, lost)
+            if is_refused(replace(ranked())):
+                met += 1
+            else:
+                assert found(replace(ranked()))[0] == pytest.approx(value, rel=1e-9)
+    assert met > 5
+
+
+def test_a_candidate_that_is_let_through_is_seen(monkeypatch):
+    """Two robots on one node, which is ranked with the others."""
+    monkeypatch.setattr(ScheduleSpace, "_possible", lambda self, step, states: states[:, 0] >= 0)
+    assert is_refused(replace(ranked()))
 
 
 # robots' readiness, the resource of makespans: what depends on the path so far

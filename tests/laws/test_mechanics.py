@@ -17,9 +17,9 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
-from seqopt.graph.decisions import pose_decisions
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states.states import build_states
+from seqopt.instances.compiled import compile_instance
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.quantities import responses_of
@@ -126,7 +126,7 @@ CASES = [CASES[0], *(pytest.param(*case, marks=pytest.mark.slow) for case in CAS
 
 
 def solved(scene, criterion):
-    problem = pose_decisions(
+    problem = seqopt.pose(
         ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
     )
     plan = seqopt.solve(problem, find_formulation("overlap_dp"))
@@ -141,12 +141,13 @@ def plain(arch25):
 @pytest.mark.parametrize(("criterion", "scales"), CASES)
 def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
     """Responses are rounded for ranks in the scene's own units."""
-    own, nodes, certificate = plain(criterion)
-    other, others, certified = solved(rescaled(arch25, *scales), criterion)
+    problem, nodes, certificate = plain(criterion)
+    again, others, certified = solved(rescaled(arch25, *scales), criterion)
     assert others == nodes
     assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
-    for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
-        np.testing.assert_allclose(b, a, rtol=1e-9)
+    own, other = map(compile_instance, (problem, again))
+    for name in ("source", "target", "amounts", "alone"):
+        np.testing.assert_allclose(getattr(other, name), getattr(own, name), rtol=1e-9)
 
 
 def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import seqopt
+from experiments.harness.layers import Budget, LayeredCosts
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.engines.registry import make_engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._orders import TooManySetsError, order_rules
-from seqopt.graph.decision_costs import Budget, LayeredCosts
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.paths import TIED
 from seqopt.network.build import build_network

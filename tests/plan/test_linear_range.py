@@ -18,7 +18,7 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.judge._step_checks import check_shape
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
-from seqopt.plan.pose import graph_of, states_of
+from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import INTERRUPTED, NONE_KEEPS, UNKNOWN, best_within
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.filters import parse_limits
@@ -184,7 +184,7 @@ def test_the_judge_finds_by_itself_that_steps_leave_the_range():
     with pytest.raises(SolverError, match="the linear range ends at"):
         check_shape(problem.engine, free.steps, limits)
     with pytest.raises(SolverError, match="the linear range ends at"):
-        judge_schedule(states_of(problem.but(limits=[HARD])), free.selection, free.steps)
+        judge_schedule(graph_of(problem.but(limits=[HARD])), free.selection, free.steps)
 
 
 def test_a_pareto_set_keeps_it():
@@ -230,17 +230,16 @@ def asked(goals):
     return seqopt.pose(engine, three_robot_loop(engine.network), WORST, goals)
 
 
-def test_a_problem_its_graphs_and_its_instance_have_one_optimum():
+def test_a_problem_its_graph_and_its_instance_have_one_optimum():
     problem = asked("sum")
-    moves, states = (graph_of(problem, moves=each) for each in (True, False))
-    arcs = seqopt.compile_instance(problem)
-    plans = [seqopt.solve(each) for each in (problem, moves, states, arcs)]
+    states, arcs = graph_of(problem), seqopt.compile_instance(problem)
+    plans = [seqopt.solve(each) for each in (problem, states, arcs)]
     best = plans[0].certificate.values
     for plan in plans:
         assert plan.certificate.values == pytest.approx(best, rel=1e-9)
         assert plan.gap == pytest.approx(0, abs=1e-9)
-    assert [bool(plan.steps) for plan in plans] == [True, True, True, False]
-    assert [plan.graph for plan in plans[1:]] == [moves, states, arcs]
+    assert [bool(plan.steps) for plan in plans] == [True, True, False]
+    assert [plan.graph for plan in plans[1:]] == [states, arcs]
 
 
 def test_a_formulation_takes_the_aim_that_is_asked():

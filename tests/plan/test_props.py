@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.judge._step_checks import check_props, props_that_hold
-from seqopt.plan.pose import states_of
+from seqopt.plan.pose import graph_of
 from seqopt.plan.replan import compared, goes_on
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.sequence.rules import FreeRules
@@ -70,10 +70,10 @@ def test_rules_count_props_as_grips():
 def test_a_plan_whose_prop_is_missing_is_refused():
     scene = weak(5, 120.0).with_props(Prop(node=5))
     plan = seqopt.solve(posed(scene))
-    states = states_of(posed(scene.with_props()))
+    states = graph_of(posed(scene.with_props()))
     with pytest.raises((SolverError, StepError)):
         judge_schedule(states, plan.selection, plan.steps)
-    judge_schedule(states_of(posed(scene)), plan.selection, plan.steps)  # the control
+    judge_schedule(graph_of(posed(scene)), plan.selection, plan.steps)  # the control
 
 
 def test_a_plan_whose_prop_pulls_is_refused_where_it_may_only_push():
@@ -91,7 +91,7 @@ def test_a_plan_whose_prop_pulls_is_refused_where_it_may_only_push():
     with pytest.raises(SolverError, match="may only push"):
         check_props(engines[at], plan.steps)
     with pytest.raises(SolverError, match="may only push"):
-        judge_schedule(states_of(posed(pull[at])), plan.selection, plan.steps)
+        judge_schedule(graph_of(posed(pull[at])), plan.selection, plan.steps)
     weakest = seqopt.make_engine("compliance", scene.with_props(Prop(node=5, capacity=0.5)))
     with pytest.raises(SolverError, match=r"bears .* N of 0\.5 N"):
         check_props(weakest, plan.steps)
@@ -178,7 +178,7 @@ def test_the_old_rest_goes_on_where_nothing_changed():
     site = Site.after(PLAN.steps, 4)
     problem = seqopt.pose(ENGINE, FreeRules(begin=site), ONES, "minmax,steps")
     rest, old = seqopt.solve(problem), PLAN.steps[4:]
-    values = goes_on(states_of(problem), old)
+    values = goes_on(graph_of(problem), old)
     assert values["steps"] == len(old)
     assert rest.objective["minmax"] <= values["minmax"] * (1 + 1e-9)
     facts = compared(rest, old)
@@ -209,12 +209,12 @@ def test_what_the_old_rest_breaks_is_named():
     rules = FreeRules(robots=left, least_grips=1, begin=after)
     two = seqopt.pose(seqopt.make_engine("compliance", scene), rules, ONES, "minmax,steps")
     with pytest.raises(StepError, match="of a free schedule"):
-        goes_on(states_of(two), old)
+        goes_on(graph_of(two), old)
     weak = SCENE.with_robots(*(replace(robot, payload=20.0) for robot in SCENE.robots))
     engine = seqopt.make_engine("compliance", weak)
     lame = seqopt.pose(engine, FreeRules(begin=site), ONES, "minmax,steps")
     with pytest.raises(StepError, match="payload exceeded"):
-        goes_on(states_of(lame), old)
+        goes_on(graph_of(lame), old)
     for wrong in ({"lost": ["rob9"]}, {"missing": [99]}):
         with pytest.raises(StepError, match="does not exist"):
             without(SCENE, site, **wrong)

@@ -49,7 +49,17 @@ CASES, FILES = 20_000, 1000
 LONGEST = 60.0  # s; a case that takes longer hangs
 ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
 STARTS = (  # of lines on standard error
-    *("seqopt", "engine: ", "enough: ", "left out: ", "grips: ", "proof: ", "robots: ", "rules: "),
+    *(
+        "seqopt",
+        "engine: ",
+        "enough: ",
+        "taken: ",
+        "left out: ",
+        "grips: ",
+        "proof: ",
+        "robots: ",
+        "rules: ",
+    ),
     *("payload: ", "payload exceeded: ", "not done, ", "kept: ", "stability: not proven; "),
     *("stresses in joints are not checked: ", "outside the linear range: "),
     "Do not rely on numbers outside the linear range. ",

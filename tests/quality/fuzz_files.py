@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 import seqopt
-from seqopt._cli.commands.replan import _told
 from seqopt._files import parse_json, read_text
 from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
-from seqopt.exchange.exports import export_plan
+from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene, read_content, read_measured
+from seqopt.plan.replan import asked_before
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import with_robots
 from tests.arms.scenes import two_arms
@@ -102,7 +102,11 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     told |= {"criterion": "worst-ratio"}
     yield (
         "summary",
-        ("summary.json", _json(told), lambda path: _told(parse_json(read_text(path), "summary"))),
+        (
+            "summary.json",
+            _json(told),
+            lambda path: asked_before(parse_json(read_text(path), "summary")),
+        ),
     )
 
 
@@ -117,7 +121,7 @@ def _of_imports() -> Iterator[tuple[str, File]]:
 
     scene = seqopt.load_scene(RIGHT)
     steps = seqopt.sequential(seqopt.build_network(scene))
-    yield "obj", ("i.obj", export_plan(scene, steps, "obj").encode(), brought)
+    yield "obj", ("i.obj", export(scene, steps, "obj").encode(), brought)
     yield "compas_assembly", ("i.json", _json(DOCUMENTS["assembly"]), brought)
     yield "boxes", ("i.csv", BOXES.encode(), brought)
 

@@ -7,7 +7,10 @@ import gzip
 import hashlib
 import json
 import re
+import sys
 from dataclasses import replace
+from html import unescape
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -17,13 +20,15 @@ import seqopt
 from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
 from seqopt._files import csv_text
+from seqopt._showing import Page
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
-from seqopt.errors import ProblemError
+from seqopt.errors import ExtraError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.report import page
 from seqopt.report._pages import OVER, plan_page
 from seqopt.report._robots import Cell, arm_data
+from seqopt.report._widget import _viewer_class
 from seqopt.report.page import LARGEST, Build, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
@@ -190,6 +195,67 @@ def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, 
         found, errors = shown(path, f"step=1&build={build}", PLAIN)
         assert errors == []
         assert f"Brick {brick} is placed by robot 1; 1 of 25 bricks stand." in found
+
+
+FRAMED = """<!doctype html><body data-told="[]"><script type="module">
+const bytes = Uint8Array.from(atob("%s"), (c) => c.charCodeAt(0)), told = [], heard = {};
+const { default: widget } = await import("data:text/javascript;base64,%s");
+const state = { page: new TextDecoder().decode(bytes), height: 500, step: 0, build: "", ...%s };
+const model = {
+  get: (name) => state[name],
+  set: (name, to) => { if (state[name] !== to) { state[name] = to; heard.on(); } },
+  save_changes: () => {
+    told.push([state.step, state.build]);
+    document.body.dataset.told = JSON.stringify(told);
+    if (told.length === 1) { state.step += 3; heard.on(); }  // as Python does
+  },
+  on: (_, call) => { heard.on = call; },
+  off: () => {},
+};
+widget.render({ model, el: document.body });
+</script></body>"""
+
+
+@pytest.mark.slow
+@browser
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({}, [[47, "sequential"], [49, "sequential"]]),
+        ({"step": 12, "build": "cantilever"}, [[12, "cantilever"], [15, "cantilever"]]),
+    ],
+)
+def test_a_widget_and_python_agree_on_the_step(engine25, builds, shown, tmp_path, asked, told):
+    page = report_page(engine25, list(builds.values()), "Two ways.")
+    script = (resources.files("seqopt") / "data/viewer/widget.mjs").read_bytes()
+    page64, script64 = (base64.b64encode(part).decode() for part in (page.encode(), script))
+    (path := tmp_path / "widget.html").write_text(FRAMED % (page64, script64, json.dumps(asked)))
+    text, errors = shown(path, words=PLAIN)
+    assert errors == []
+    assert json.loads(unescape(re.search('data-told="(.*?)"', text)[1])) == told
+
+
+def test_a_page_is_a_widget_with_traits(engine25, builds):
+    pytest.importorskip("anywidget")
+    page = Page(report_page(engine25, list(builds.values()), ""), height=400)
+    widget = page.widget(step=7)
+    state = widget.get_state()
+    assert {name: state[name] for name in ("page", "height", "step", "build")} == {
+        "page": page.text,
+        "height": 400,
+        "step": 7,
+        "build": "",
+    }
+    assert "export default" in state["_esm"]
+    with pytest.raises(Exception, match="-1"):
+        widget.step = -1
+
+
+def test_without_anywidget_one_line_says_what_to_install(monkeypatch):
+    _viewer_class.cache_clear()
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    with pytest.raises(ExtraError, match=r"pip install 'seqopt\[notebook\]'"):
+        Page("").widget()
 
 
 def tables_of(text):

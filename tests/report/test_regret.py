@@ -12,7 +12,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import NothingFoundError
-from seqopt.plan.pose import states_of
+from seqopt.plan.pose import graph_of
 from seqopt.report._regret._chart import PALE, regret_chart
 from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
 from seqopt.report._regret._table import CUT, DONE, FALLS, SAME, RegretTable, dominated
@@ -86,6 +86,22 @@ def test_what_to_take_is_computed():
     assert "no plan known is better" not in unproven.sentence  # it is not the best known
     luck = made(FOUR[0], ("compliance", FREE, "path_beam", "", False, 0.05, 0.0))
     assert luck.take["formulation"] == "schedule_search"  # what proves comes first
+    assert luck.sentence.endswith(
+        "sooner is compliance with path_beam on the free schedule in 0.0500 s: its plan is as "
+        "good, without a proof."
+    )
+    assert luck.shown.iloc[1].to_dict() == {
+        "engine": "compliance",
+        "schedule": FREE,
+        "formulation": "path_beam",
+        "time, s": 0.05,
+        "regret": "0",
+        "gap to its bound": "0",
+        "error of its model": "0",
+        "proven": "",
+        "models": 1,
+        "outcome": DONE,
+    }
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +117,7 @@ def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
     rows = measured.table.set_index(["engine", "schedule", "formulation", "without"])["value"]
     assert rows["compliance", FREE, "schedule_search", ""] == best.objective["minmax"]
     loop = seqopt.solve(seqopt.pose(engine, seqopt.three_robot_loop(engine.network), RANKS))
-    limits = dict(states_of(problem).criterion.limits)
+    limits = dict(graph_of(problem).criterion.limits)
     bare = Step(1, StepKind.RELEASE, 4, (None, None, None))
     table = pd.concat([seqopt.analyze(engine, loop.steps), seqopt.analyze(engine, [bare])])
     grips = table[[force_column(robot) for robot in engine.network.scene.robots]].to_numpy(float)

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from seqopt.engines.registry import make_engine
+from seqopt.plan.pose import graph_of, pose
 from seqopt.responses import _grip_sets as batches
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
+from seqopt.study.published import EQUATIONS
+from seqopt.work._workers import keep
 
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
@@ -36,9 +38,11 @@ def client():
 
 def evaluated(schedule, resources):
     engine = make_engine("auto", schedule.scene)
-    found = Evaluation(engine, schedule, lambda _: {*CHOICE_RESPONSES}, resources)
-    every = ((step, step.responses[name]) for step in found.steps for name in CHOICE_RESPONSES)
-    return np.concatenate([values.ravel() for _, values in every])
+    graph = graph_of(pose(engine, schedule, EQUATIONS, resources=resources))
+    levels = [k for k in range(1, graph.space.levels + 1) if graph.space.open_columns(k)]
+    with keep(resources.executor, resources.workers):
+        every = [graph.seen(k, graph.space.candidates(k).states).responses for k in levels]
+    return np.concatenate([own[name] for own in every for name in sorted(own)])
 
 
 def require_same(found, expected):

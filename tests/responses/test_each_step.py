@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import rankdata
 
 import seqopt
 from experiments.harness.scenes import running_bond
@@ -17,15 +18,15 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import FLAGS, Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, SolverError
-from seqopt.graph.decisions import pose_decisions
 from seqopt.network.build import build_network
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import RankSum, equal
+from seqopt.problem.requirements import Limit
 from seqopt.responses import _blocks as batches
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses.quantities import responses_of
-from seqopt.responses.table import LinearRange, _each_fields, analyze, step_fields
+from seqopt.responses.table import LinearRange, _each_fields, analyze, force_column, step_fields
 from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study.published import EQUATIONS
@@ -86,52 +87,105 @@ def test_an_error_names_the_step_whose_it_is(engine, builds):
 
 
 COMPARED = ("T_max", "M_sup", "D_max")
+BEYOND = [Limit("C_max", 1e9), Limit("F_largest", 1e9)]  # so that these are responses as well
+
+
+def steps_at(graph, level, states):
+    """States of a level as steps."""
+    step, nodes = graph.rules.steps[level - 1], (None, *graph.network.scene.placed_nodes)
+    rows = [tuple(nodes[place] for place in row) for row in states.tolist()]
+    return [Step(step.number, step.kind, step.bricks, row) for row in rows]
+
+
+def open_levels(graph):
+    return [level for level in range(1, graph.space.levels + 1) if graph.space.open_columns(level)]
 
 
 @pytest.mark.parametrize("method", ["three-robot", "modified-sequential"])
 def test_states_hold_the_responses_of_their_steps(engine25, method):
-    """Every response of a random filled schedule is found again in the problem's steps."""
-    schedule = SCHEDULES[method](engine25.network)
-    also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", *COMPARED, "C_max")
-    problem = pose_decisions(engine25, schedule, EQUATIONS, also=also)
-    rng = np.random.default_rng(1)
-    choice: list[int] = []
-    for k, move in enumerate(schedule.moves):
-        allowed = np.flatnonzero(np.isfinite(problem.sums.shared[k][choice[-1] if choice else 0]))
-        choice.append(int(rng.choice(allowed)))
-        assert len(move.candidates) > choice[-1]
-    steps = {s.number: s for s in schedule.fill(problem.nodes(choice))}
-    for choices in problem.evaluation.steps:
-        chosen = tuple(choice[m] for m in choices.moves)
-        step = steps[choices.step.number]
+    """Of a random candidate of every open step: as if that step were analyzed alone."""
+    graph = graph_of(pose(engine25, SCHEDULES[method](engine25.network), EQUATIONS, limits=BEYOND))
+    rng, robots = np.random.default_rng(1), engine25.network.scene.robots
+    for level in open_levels(graph):
+        every = graph.space.candidates(level).states
+        at = int(rng.integers(len(every)))
+        found = {name: v[at] for name, v in graph.seen(level, every).responses.items()}
+        (step,) = steps_at(graph, level, every[at : at + 1])
         want = responses_of(engine25.network, step_fields(engine25, step))
         for name in COMPARED:
-            assert choices.responses[name][chosen] == pytest.approx(want[name][0])
-        compressed = choices.responses["C_max"][chosen]
-        assert compressed == pytest.approx(max(0.0, -want["F_min"][0]))
-        forces = iter(np.abs(want["F_rob"][0]))
-        for i, node in enumerate(step.grips):
-            found = choices.responses[f"F_rob{i + 1}"][chosen]
-            assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
+            assert found[name] == pytest.approx(want[name][0])
+        assert found["C_max"] == pytest.approx(max(0.0, -want["F_min"][0]))
+        forces = np.abs(want["F_rob"][0])
+        assert found["F_largest"] == pytest.approx(forces.max())
+        own = iter(forces)
+        by_robot = {
+            robot.name: np.nan if node is None else next(own)
+            for robot, node in zip(robots, step.grips, strict=True)
+        }
+        for name, force in by_robot.items():
+            assert found[f"F_{name}"] == pytest.approx(force, nan_ok=True)
+        moving = graph.space.decided_by(level).robot
+        assert found["F_move"] == pytest.approx(by_robot[moving])
+
+
+def borda(graph, level):
+    """Mean ranks among the candidates of a level by equations (2) and (3), from a table of steps.
+
+    Of two open moves ranks among all pairs are scaled to as many as the later one has candidates.
+    """
+    move = graph.space.decided_by(level)
+    every = graph.space.candidates(level).states
+    table = analyze(graph.engine, steps_at(graph, level, every))
+    forces = {r.name: table[force_column(r)].to_numpy(float) for r in graph.network.scene.robots}
+    moment = table["M_sup_Nm"].to_numpy(float)
+    ranked = [table["F_max_N"].to_numpy(float).clip(min=0), moment]  # the largest tension
+    if move.bricks < 13:  # the crown of the arch
+        ranked += forces.values()
+    else:
+        ranked += [forces[move.robot], table["D_max_1e-3mm"].to_numpy(float)]
+    count, total = len(move.candidates), 0.0
+    for values in ranked:
+        own = rankdata(np.round(np.abs(np.nan_to_num(values))))
+        if len(graph.space.open_columns(level)) > 1:
+            own = (own - 0.5) * count / len(own) + 0.5
+        total += own if np.isfinite(values).any() else 0.5 * (count + 1)
+    return every, total / len(ranked)
+
+
+@pytest.mark.parametrize("level", [4, 7, 27, 50, 51])
+def test_ranks_among_candidates_are_those_of_the_equations(engine25, loop25, level):
+    """Before and after the crown, of one open move and of two."""
+    graph = graph_of(pose(engine25, loop25, EQUATIONS))
+    every, expected = borda(graph, level)
+    assert graph.candidates.among(level, every) == pytest.approx(expected, rel=1e-12)
+    assert len(every) == graph.space.candidates(level).possible.sum() > 1
+
+
+def test_steps_without_an_open_grip_have_no_ranks(engine25, loop25):
+    graph = graph_of(pose(engine25, loop25, EQUATIONS))
+    given = [*graph.space.without_choice()]
+    assert len(given) == sum(not step.moves for step in loop25.steps) > 0
+    assert not any(graph.candidates.among(level, state).any() for level, state in given)
 
 
 def test_unknown_responses_are_refused(engine25, loop25):
-    with pytest.raises(ProblemError, match="response F_rob9 does not exist; give C_max, D_max"):
-        pose_decisions(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
+    with pytest.raises(ProblemError, match=r"criterion x: .* no F_rob9; give C_max, D_max"):
+        pose(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
 
 
-def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
-    schedule = three_robot_loop(engine25.network)
-    monkeypatch.setattr(batches, "BLOCK", 10**9)
-    whole = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
-    assert whole.steps
-    monkeypatch.setattr(batches, "BLOCK", 100)
-    parts = Evaluation(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
-    assert parts.models == whole.models
-    for a, b in zip(parts.steps, whole.steps, strict=True):
-        for name in CHOICE_RESPONSES:
-            most = 1e-11 * np.nanmax(np.abs(b.responses[name]), initial=0.0)
-            assert a.responses[name] == pytest.approx(b.responses[name], abs=most, nan_ok=True)
+def test_fields_are_asked_for_in_blocks(engine25, loop25, monkeypatch):
+    found = []
+    for size in (10**9, 100):
+        monkeypatch.setattr(batches, "BLOCK", size)
+        graph = graph_of(pose(engine25, loop25, EQUATIONS, limits=BEYOND))
+        states = {level: graph.space.candidates(level).states for level in open_levels(graph)}
+        found.append({k: graph.seen(k, rows).responses for k, rows in states.items()})
+        assert graph.models == 8642
+    whole, parts = found
+    for level, responses in whole.items():
+        for name, values in responses.items():
+            most = 1e-11 * np.nanmax(np.abs(values), initial=0.0)
+            assert parts[level][name] == pytest.approx(values, abs=most, nan_ok=True)
 
 
 # the table of grips says what the table of responses says, grip by grip
@@ -175,7 +229,7 @@ def test_another_force_is_seen(plans):
 def test_the_table_of_a_plan_has_the_node_that_was_chosen_for_every_move(plans):
     plan, _ = plans
     rows = plan.table().set_index(["robot", "from_step"])
-    for move, node in zip(plan.decisions.schedule.moves, plan.nodes, strict=True):
+    for move, node in zip(plan.problem.schedule.moves, plan.nodes, strict=True):
         assert rows.loc[(move.robot, move.step), "node"] == node
 
 
@@ -210,12 +264,12 @@ def test_an_engine_of_ones_own_is_held_to_finite_numbers(field, value, named):
     """NaN dropped T_max from the ranks, and the choice was called optimal."""
     network = build_network(six_bricks())
     engine = Broken(ComplianceEngine(network), field, value)
-    problem = pose_decisions(engine, three_robot_loop(network), EQUATIONS, also=("T_max", "M_sup"))
+    problem = pose(engine, three_robot_loop(network), EQUATIONS)
     with np.errstate(invalid="ignore"):
         with pytest.raises(SolverError, match=f"({named}) is not finite"):
             analyze(engine, sequential(network))
         with pytest.raises(SolverError, match=f"({named}) is not finite"):
-            _ = problem.sums
+            solve(problem, "overlap_dp")
 
 
 def test_what_a_library_raises_is_an_error_of_ours():
@@ -264,6 +318,7 @@ def test_within_elastic_limits_discrete_elements_change_nothing(name):
     said = f"discrete elements{of_epoxy} would change nothing in these steps"
     assert said in found.others
     assert found.below_limit > 0
+    assert found.lines[0].startswith("enough: compliance; ")  # the level that auto took
     assert f"{found.joint} in {found.step}" in found.lines[0]
     detailed = seqopt.analyze(DiscreteEngine(seqopt.build_network(arch())), steps)
     for column in ("F_max_N", "M_sup_Nm", "D_max_1e-3mm"):
@@ -274,7 +329,7 @@ def test_beyond_elastic_limits_nothing_is_promised():
     """The negative control: so heavy that joints break, and discrete elements answer otherwise."""
     found, steps, table = enough(arch(2e6), "compliance")
     assert found.below_limit < 0
-    assert "discrete elements would change is not known" in found.others
+    assert found.lines[0].startswith("taken: compliance; what discrete elements would change is")
     number = int(found.step.removeprefix("step "))
     engine = DiscreteEngine(seqopt.build_network(arch(2e6)))
     try:

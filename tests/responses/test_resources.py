@@ -14,17 +14,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import seqopt
 from seqopt._cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import ENGINES, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MemoryShortError, ProblemError, SceneError
-from seqopt.graph.decisions import pose_decisions
+from seqopt.errors import ProblemError, SceneError
 from seqopt.network.build import build_network
+from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
+from seqopt.problem.criteria import RankSum, equal
+from seqopt.problem.requirements import CHOICE_RESPONSES, Limit
 from seqopt.responses import _grip_sets as division
 from seqopt.responses._blocks import Block, answer, packed
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, _sets_of
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
@@ -32,34 +34,40 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS, WORST_RATIO
+from seqopt.work._workers import keep
 from tests.builders import six_bricks
 
 NAMES = ("T_max", "M_sup", "D_max", "C_max")
 
 
-def everything(_):
-    return {*CHOICE_RESPONSES, "F_rob1"}
-
-
-def evaluation(engine, schedule, **resources):
-    return Evaluation(engine, schedule, everything, Resources(**resources))
+def evaluated(engine, schedule, **resources):
+    """The graph of a schedule and the responses of all candidates of its open steps, by level."""
+    limits = [Limit(name, 1e9) for name in ("C_max", "F_largest")]
+    posed = pose(engine, schedule, EQUATIONS, limits=limits, resources=Resources(**resources))
+    graph = graph_of(posed)
+    levels = [k for k in range(1, graph.space.levels + 1) if graph.space.open_columns(k)]
+    states = {level: graph.space.candidates(level).states for level in levels}
+    with keep(graph.resources.executor, graph.resources.workers):
+        return graph, {k: graph.seen(k, rows).responses for k, rows in states.items()}
 
 
 def require_alike(found, expected):
     """Sets share their work with others: the last digits may differ."""
-    for one, other in zip(found, expected, strict=True):
-        assert one.step == other.step
-        for name, values in other.responses.items():
+    assert found.keys() == expected.keys()
+    for level, responses in expected.items():
+        for name, values in responses.items():
             most = 1e-11 * np.nanmax(np.abs(values), initial=0.0)
-            assert one.responses[name] == pytest.approx(values, abs=most, nan_ok=True)
+            assert found[level][name] == pytest.approx(values, abs=most, nan_ok=True)
 
 
 def blocks_of(schedule, most):
     """Return the grip sets of open steps by brick count, in blocks of at most so many."""
+    space = graph_of(pose(ComplianceEngine(schedule.scene), schedule, EQUATIONS)).space
     out = []
-    for step in schedule.steps:
-        for grips in _sets_of(schedule, step, {}).grips if step.moves else ():
-            out.append((step.bricks, len(grips), *np.sort(grips).tolist()))
+    for level, step in enumerate(schedule.steps, start=1):
+        for held in space.held(space.candidates(level).states) if step.moves else ():
+            nodes = [schedule.scene.placed_nodes[place - 1] for place in held if place]
+            out.append((step.bricks, len(nodes), *sorted(nodes)))
     groups = [[*own] for _, own in groupby(sorted({*out}), key=itemgetter(0, 1))]
     return [
         Block(own[0][0], np.array([row[2:] for row in own[at : at + most]]), NAMES)
@@ -81,10 +89,11 @@ def small_blocks(monkeypatch):
 def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, workers):
     alone = make_engine(name, loop25.scene)
     shared = make_engine(name, loop25.scene)
-    expected = evaluation(alone, loop25)
-    found = evaluation(shared, loop25, workers=workers)
-    require_alike(found.steps, expected.steps)
-    assert found.models == expected.models == 8642
+    (one, expected), (other, found) = (
+        evaluated(alone, loop25), evaluated(shared, loop25, workers=workers)
+    )  # fmt: skip
+    require_alike(found, expected)
+    assert one.models == other.models == 8642
 
 
 BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane
@@ -140,7 +149,8 @@ def test_the_scene_is_sent_and_no_operators(loop25):
     engine.solve(1, [[1]])  # what the scene knows of its grips and props goes along
     engine.network.scene.prop_numbers(1, held=True)
     before = len(packed(engine))
-    assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
+    for block in blocks_of(loop25, 2048):  # operators of all brick counts
+        engine.solve(block.bricks, block.grips, Want.SCREEN)
     assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
     assert len(pickle.dumps(engine)) > 20 * before
 
@@ -149,7 +159,7 @@ def test_an_engine_that_cannot_be_sent_is_refused_in_a_line(loop25):
     engine = ComplianceEngine(loop25.scene)
     engine.lock = lambda: None
     with pytest.raises(SceneError, match="engine ComplianceEngine: it cannot be sent"):
-        _ = evaluation(engine, loop25, workers=2).steps
+        evaluated(engine, loop25, workers=2)
 
 
 @pytest.mark.slow
@@ -158,43 +168,18 @@ def test_a_network_that_is_not_its_scenes_is_not_made_anew(loop25):
     network = build_network(loop25.scene)
     heavier = replace(network, weight=2 * network.weight)
     engine = make_engine("compliance", heavier)
-    found = evaluation(engine, loop25, workers=2).steps
-    require_alike(found, evaluation(make_engine("compliance", heavier), loop25).steps)
+    found = evaluated(engine, loop25, workers=2)[1]
+    require_alike(found, evaluated(make_engine("compliance", heavier), loop25)[1])
     with pytest.raises(AssertionError):
-        require_alike(found, evaluation(make_engine("compliance", network), loop25).steps)
+        require_alike(found, evaluated(make_engine("compliance", network), loop25)[1])
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"workers": 0},
-        {"workers": 1.5},
-        {"workers": True},
-        {"executor": 2},
-        {"max_memory": 0},
-        {"max_memory": float("nan")},
-        {"max_memory": "2GB"},
-    ],
+    "wrong", [{"workers": 0}, {"workers": 1.5}, {"workers": True}, {"executor": 2}]
 )
 def test_resources_that_cannot_be_meant_are_refused(wrong):
     with pytest.raises(ProblemError, match=next(iter(wrong))):
         Resources(**wrong)
-
-
-# memory
-
-
-def test_choices_that_do_not_fit_are_refused(engine25, loop25):
-    """The control has just as much as is said to be needed, and its costs are the same."""
-    few, whole = (
-        pose_decisions(engine25, loop25, EQUATIONS, resources=Resources(max_memory=most))
-        for most in (1e5, None)
-    )
-    with pytest.raises(MemoryShortError, match="search without proof") as caught:
-        _ = few.sums
-    needed = 1e9 * float(str(caught.value).partition("about ")[2].split()[0])
-    enough = replace(few.evaluation, resources=Resources(max_memory=1.01 * needed))
-    assert replace(few, evaluation=enough).sums == whole.sums
 
 
 def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
@@ -205,10 +190,11 @@ def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
             wants.add(want)
             return self.engine.solve(bricks, grips, want)
 
-    engine = Asked(loop25.scene)
-    forces = Evaluation(engine, loop25, lambda _: {"F_move"})
-    assert {name for step in forces.steps for name in step.responses} == {"F_move"}
-    assert wants == {Want.SCREEN}  # grip forces always come: no field beside them was evaluated
+    forces = pose(Asked(loop25.scene), loop25, RankSum("own", equal("F_move"), equal("F_move")))
+    graph = graph_of(forces)
+    assert solve(graph, "overlap_dp", proof=False).steps
+    assert graph.sets.names == ()
+    assert wants == {Want(0)}  # grip forces always come: no field beside them was evaluated
 
 
 # robots' columns and responses collide with nothing, whatever the robots are called
@@ -216,7 +202,6 @@ def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
 
 ODD = ["each", "[sup]", "a,b"]
 PAYLOAD = 40.0  # N
-ALSO = ("F_move", "F_largest", "T_max", "M_sup")
 EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
 
 
@@ -230,9 +215,9 @@ def called(*names):
     return replace(scene, robots=tuple(robots))
 
 
-def posed(scene, criterion, **more):
+def posed(scene, criterion):
     network = build_network(scene)
-    return pose_decisions(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
+    return pose(ComplianceEngine(network), three_robot_loop(network), criterion)
 
 
 @cache
@@ -244,7 +229,7 @@ def tabled(name):
 @cache
 def plainly(criterion):
     """The problem and its plan where names are not odd."""
-    problem = posed(called("one", "two", "three"), criterion, also=ALSO)
+    problem = posed(called("one", "two", "three"), criterion)
     return problem, solve(problem, "overlap_dp")
 
 
@@ -261,14 +246,13 @@ def test_a_name_changes_no_number(name):
 @pytest.mark.parametrize("criterion", [EVERY, WORST_RATIO], ids=lambda c: c.name)
 def test_a_name_changes_no_choice(name, criterion):
     plain, chosen = plainly(criterion)
-    odd = posed(called("one", name, "three"), criterion, also=ALSO)
-    for first, second in zip(plain.sums.single, odd.sums.single, strict=True):
-        np.testing.assert_array_equal(first, second)
-    for first, second in zip(plain.evaluation.steps, odd.evaluation.steps, strict=True):
-        for response in ALSO:
-            np.testing.assert_array_equal(first.responses[response], second.responses[response])
+    odd = posed(called("one", name, "three"), criterion)
+    first, second = (seqopt.compile_instance(problem) for problem in (plain, odd))
+    for arrays in ("amounts", "alone"):
+        np.testing.assert_array_equal(getattr(first, arrays), getattr(second, arrays))
     other = solve(odd, "overlap_dp")
-    assert chosen.selection == other.selection
+    for what in ("states", "objective", "bound"):
+        assert getattr(chosen.selection, what) == getattr(other.selection, what)
 
 
 @settings(max_examples=10)

@@ -180,6 +180,11 @@ def break_at(path, value):
             "cube",
             r"robots\[0\]: reach: kind is 'cube'; give one of",
         ),
+        (
+            ("robots", 0, "reach"),
+            {"kind": "sphere", "center": [0, 0], "radius": 1},
+            r"robots\[0\]: reach: center is \[0, 0\]; give three",
+        ),
         (("provenance",), 3, r"provenance is 3; give a str"),
         (("bricks", 3, "length_axis"), [0, 0, 2], r"brick 4: length_axis.*unit"),
         (("bricks", 3, "name"), 3, r"brick 3 occurs twice"),

@@ -55,8 +55,8 @@ def test_one_line_says_what_is_wrong(what, name):
     ("make", "said"),
     [
         (lambda: bond_mortar("x"), "mortar: tensile_strength is 'x'; give a number"),
-        (lambda: find_mortar(3), "mortar 3: give a Mortar, or one of epoxy, dry, or bond="),
-        (lambda: find_mortar([]), r"mortar \[\]: give a Mortar"),
+        (lambda: find_mortar(3), "mortar 3: give epoxy, dry, or bond="),
+        (lambda: find_mortar([]), r"mortar \[\]: give epoxy"),
     ],
 )
 def test_the_field_is_named(make, said):

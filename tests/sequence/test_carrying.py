@@ -13,7 +13,7 @@ from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import find_front
-from seqopt.plan.pose import states_of
+from seqopt.plan.pose import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
 from seqopt.sequence._rule_check import check_carried, too_heavy
@@ -122,14 +122,15 @@ def test_orders_put_the_heavy_brick_into_strong_hands():
         find_front(posed(wall(150.0, 150.0), goals="F_largest,D_max", orders="tied"))
 
 
-@pytest.mark.parametrize("name", formulations("costs"))
+@pytest.mark.parametrize("name", [n for n, f in formulations("goals").items() if f.aim])
 def test_every_formulation_of_a_loop_refuses_it(name):
     weak = seqopt.load_scene("wall:columns=3,courses=2")
     weak = weak.with_robots(*(replace(r, payload=22.0) for r in weak.robots))
-    said = r"rob1 carries up to 23\.5 N \(brick \d\), more than its payload of 22 N"
+    said = r"in step 1 brick 1 weighs 23\.5 N, more than the payload of rob1 \(22 N\)"
     engine = seqopt.make_engine("compliance", weak)
-    with pytest.raises(InfeasibleError, match=rf"{said}.* it takes --payload rob\d=24"):
+    with pytest.raises(InfeasibleError, match=said) as caught:
         seqopt.solve(seqopt.pose(engine, seqopt.three_robot_loop(engine.network), WORST), name)
+    assert newtons(caught.value) == 24
 
 
 def loop(*payloads):
@@ -150,18 +151,18 @@ def test_states_of_a_loop_are_refused_and_judged_too():
     assert newtons(caught.value) == 24
     strong = seqopt.pose(*loop(141.0, 24.0, 141.0), WORST, "minmax")
     plan = seqopt.solve(strong)
-    assert Proof(states_of(weak)).is_impossible()
-    assert not Proof(states_of(strong)).is_impossible()
+    assert Proof(graph_of(weak)).is_impossible()
+    assert not Proof(graph_of(strong)).is_impossible()
     with pytest.raises(StepError, match=r"step 2: brick \d weighs"):
-        judge_schedule(states_of(weak), plan.selection, plan.steps)
-    assert judge_schedule(states_of(strong), plan.selection, plan.steps).gap == 0
+        judge_schedule(graph_of(weak), plan.selection, plan.steps)
+    assert judge_schedule(graph_of(strong), plan.selection, plan.steps).gap == 0
     with pytest.raises(StepError, match=r"step 2: brick \d weighs"):
         check_carried(engine.network.scene, plan.steps)
 
 
 @pytest.mark.parametrize("rules", [ANYHOW, DOWN])
 def test_the_judge_knows_it_by_itself(rules):
-    weak, strong = (states_of(posed(wall(150.0, most), rules)) for most in (150.0, 300.0))
+    weak, strong = (graph_of(posed(wall(150.0, most), rules)) for most in (150.0, 300.0))
     assert Proof(weak).is_impossible()
     assert not Proof(strong).is_impossible()
     plan = seqopt.solve(posed(wall(150.0, 300.0), rules))
@@ -184,12 +185,12 @@ def test_bricks_are_carried_in_every_scenario():
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(posed(scene, scenarios=worlds))
     assert seqopt.solve(posed(scene, scenarios=worlds[:1])).steps
-    assert Proof(states_of(posed(scene, scenarios=worlds))).is_impossible()
+    assert Proof(graph_of(posed(scene, scenarios=worlds))).is_impossible()
     engine, schedule = loop(30.0, 30.0, 30.0)
     own = engine.network.scene
     heavier = replace(own, weight_factor=1.5)
     for over in ("worst-peak", "worst-total"):
-        with pytest.raises(InfeasibleError, match=r"rob1 carries up to 35\.3 N"):
+        with pytest.raises(InfeasibleError, match=said):
             seqopt.solve(seqopt.pose(engine, schedule, WORST, scenarios=[own, heavier], over=over))
 
 

@@ -100,7 +100,7 @@ def test_how_a_leaning_brick_falls(friction, word):
 def test_wrong_words(network, builds):
     with pytest.raises(SceneError, match="axis 'wind': give one of friction, tilt"):
         failure_map(network.scene, builds, axis="wind")
-    with pytest.raises(SceneError, match="mortar 'glue'"):
+    with pytest.raises(SceneError, match="mortar glue: give epoxy"):
         failure_map(network.scene, builds, ["glue"])
 
 

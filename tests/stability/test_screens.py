@@ -134,7 +134,7 @@ def test_wrong_questions_get_a_line(arch25):
         Screen(unequal, DRY).stands(5, [[1, 2]])
     with pytest.raises(SceneError, match="bond=STRENGTH"):
         Screen(arch25, "bond=strong")
-    with pytest.raises(SceneError, match="tensile_strength is -1"):
+    with pytest.raises(SceneError, match="mortar bond=-1: give epoxy, dry, or bond=STRENGTH"):
         Screen(arch25, "bond=-1")
 
 
@@ -200,7 +200,7 @@ def test_steps_of_plans_say_the_same_alone_and_together(arch25):
     scene = arch25.with_props(Prop(node=20), Prop(node=30, direction=UP))
     network = seqopt.build_network(scene)
     steps = seqopt.sequential(network)[10:30]
-    chained = [found.verdict for found in seqopt.assess_steps(network, steps, "dry")]
+    chained = [found.verdict for found in seqopt.assess(network, steps, "dry")]
     alone = [
         assess(step_assembly(network, s.bricks, s.grips), seqopt.DRY, margins=()).verdict
         for s in steps
@@ -214,7 +214,7 @@ def test_what_is_not_found_with_props_that_push_is_said(arch25):
     network = seqopt.build_network(scene)
     with pytest.raises(SceneError, match="the least payload is not found where props only push"):
         Margins(network, seqopt.DRY).grip(5, [[10, 7]])
-    (found,) = seqopt.assess_steps(network, seqopt.sequential(network)[9:10], "dry", ["payload"])
+    (found,) = seqopt.assess(network, seqopt.sequential(network)[9:10], "dry", ["payload"])
     assert np.isnan(found.grip)
     windy = seqopt.build_network(replace(scene, wind=(0.1, 0.0, 0.0)))
     with pytest.raises(SceneError, match="load factors know no props that only push"):

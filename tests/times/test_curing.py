@@ -178,7 +178,7 @@ def test_with_full_bond_verdicts_are_those_without_age():
     builds = CuringBuilds(network, seqopt.EPOXY, _find_curing("15min"))
     steps = [step for step in seqopt.sequential(network) if step.bricks > 1]
     for mortar, share in ((seqopt.EPOXY, 1.0), (seqopt.DRY, 0.0)):
-        wanted = [r.verdict for r in seqopt.assess_steps(network, steps, mortar)]
+        wanted = [r.verdict for r in seqopt.assess(network, steps, mortar)]
         shares = [np.full(builds.joints.count(step.bricks), share) for step in steps]
         pairs = zip(steps, shares, strict=True)
         assert [builds.verdict(s.bricks, s.grips, bond)[0] for s, bond in pairs] == wanted
