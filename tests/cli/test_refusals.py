@@ -51,7 +51,7 @@ BAD = {
     # scenarios
     f"{ROBUST} cvar=2": "cvar=2.0: give a level",
     f"{ROBUST} worst-total --formulation minimax": "use scenario_search",
-    f"{ROBUST} worst-peak --budget travel=0.8": "the budget 'travel' couples all moves",
+    f"{ROBUST} worst-peak --formulation minimax --budget travel=2m": "couples all moves; use",
     f"{ROBUST} worst-total --schedule free --aim steps": "of one sum alone",
     f"{ROBUST} worst-peak --scenarios x": "--scenarios x: give a whole number",
     f"{ROBUST} worst-peak --vary density=-1": "not a positive number",
@@ -114,6 +114,7 @@ BAD = {
     f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
 }
 NO_ANSWER = {
+    f"{ROBUST} worst-peak --budget travel=0.8": "no plan is within all budgets; travel is at least",
     f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
     f"{FREE} --stands bond=1e-9 --friction 0.01": "a bond of ",
     f"{FREE} --limit F_largest=1": "it becomes possible with F_largest=",

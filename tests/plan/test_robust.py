@@ -255,6 +255,6 @@ def test_what_is_no_problem_is_refused():
         robust(own, drawn, WORST_PEAK)
     capped = robust(problem, drawn, WORST_PEAK).but(budgets=("travel=3m",))
     with pytest.raises(ProblemError, match="minimax: the budget 'travel' couples all moves"):
-        seqopt.solve(capped)
+        seqopt.solve(capped, "minimax")
     with pytest.raises(ProblemError, match="is not a kind"):
         RobustAim("worst-peak")
