@@ -66,6 +66,16 @@ def _walks(problem: States, formulation: Formulation, run: Run) -> bool:
     return asked and problem.rules.names_robots() and not (problem.scenarios or problem.budgets)
 
 
+def _for_search(problem: States) -> States:
+    """Return a copy for a formulation: what it changes is its own, and the judge keeps its own."""
+    own = replace(problem, judged={})
+    known = {key: vars(problem)[key] for key in COUNTED if key in vars(problem)}
+    if "each" in known:
+        known["each"] = tuple(map(_for_search, known["each"]))
+    vars(own).update(known)
+    return own
+
+
 def _selected(
     formulation: Formulation, problem: States, options: Mapping[str, Any], run: Run
 ) -> Solution:
@@ -76,10 +86,7 @@ def _selected(
         raise confirmed(replace(problem), name, limit, explain=run.explains)
     if _walks(problem, formulation, run):
         return walk(problem, Watch(run.left))
-    own = replace(
-        problem, judged={}
-    )  # the formulation's: what it changes or leaves behind is its own
-    vars(own).update({key: vars(problem)[key] for key in COUNTED if key in vars(problem)})
+    own = _for_search(problem)
     try:
         selection = called(name, Solution, partial(formulation.solve, own, **options))
     except InfeasibleError as error:

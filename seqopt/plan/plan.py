@@ -236,7 +236,7 @@ class Plan(ShownBuild):
         proof, stopped = self.certificate, bool(self.stopped)
         if proof is None:
             return Status.FEASIBLE if stopped else Status.UNPROVEN
-        exact = not stopped and self.formulation.kind is not FormulationKind.HEURISTIC
+        exact = not stopped and self.formulation.kind is FormulationKind.EXACT
         settled = self.graph.settles(exact=exact) and isfinite(proof.gap)
         if settled or proof.gap <= TOLERANCE:
             return Status.OUTSIDE if self.is_far else Status.OPTIMAL

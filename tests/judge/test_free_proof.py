@@ -22,7 +22,8 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.sequence.steps import StepKind
-from tests.builders import first
+from seqopt.study.published import EQUATIONS
+from tests.builders import first, small_arch
 from tests.layered import Costs, answer, changed, path_of, told
 from tests.plain_rules import PlainBook
 from tests.strategies import free_builds, problems
@@ -127,6 +128,33 @@ def test_promises_are_held(problem25):
         solve(problem25, changed(cascade, poor))
     with pytest.raises(SolverError, match=r"660\.\d+ is promised as the least; a plan has less"):
         solve(problem25, changed(cascade, bounded(lambda value: 0.995 * value)))
+
+
+def test_a_formulation_of_bounds_is_not_optimal_by_its_kind(problem25):
+    """Of its bound and of its path only what the judge proves counts."""
+    cascade = find_formulation("cascade")
+    plan = solve(problem25, replace(cascade, kind=FormulationKind.BOUND))
+    assert (plan.status, plan.gap) == ("feasible", pytest.approx(0.0096, abs=2e-4))
+
+
+def test_a_formulation_is_not_given_what_the_judge_computed():
+    seen, scene = [], small_arch(5)
+    cascade = find_formulation("cascade")
+
+    def looks(problem, **means):
+        seen.extend([problem, *problem.each])
+        return cascade.solve(problem, **means)
+
+    worlds = seqopt.scenarios(scene, count=2, seed=1)
+    engine = seqopt.make_engine("compliance", scene)
+    problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), EQUATIONS)
+    problem = problem.but(scenarios=worlds, goals="minmax", limits="F_largest=1e6")
+    solve(problem, "minimax")
+    (graph,) = problem.graphs.values()
+    solve(problem, replace(cascade, solve=looks))
+    assert graph.judged
+    assert len(seen) == 3
+    assert not any(each.judged for each in seen)
 
 
 def proven(costs, aim):

@@ -209,7 +209,7 @@ class States(Shown):
     def settles(self, *, exact: bool) -> bool:
         """Return whether a judged exact search is optimal, up to the proven width of margins."""
         beside = self.budgets or self.totals or self.is_timed or self.paths
-        return exact and not beside
+        return exact and any(goal.margins for goal in self.aims) and not beside
 
     def described(self, limits: Mapping[str, object]) -> dict[str, object]:
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
