@@ -59,11 +59,15 @@ def find_states(problem: States, formulation: Formulation, run: Run) -> Found:
 
 
 def _walks(problem: States, formulation: Formulation, run: Run) -> bool:
-    """Return whether a formulation looks at one decision after the other, and no proof is asked."""
+    """Return whether a formulation looks at one decision after the other, and no proof is asked.
+
+    What a single step does not tell is not looked at: whether it stands, and what paths must keep.
+    """
     alone = formulation.window_options
     asked = not run.proof and alone is not None and run.options in ({}, alone)
     asked &= all(goal.of_criterion for goal in problem.aims)
-    return asked and problem.rules.names_robots() and not (problem.scenarios or problem.budgets)
+    beside = problem.scenarios or problem.budgets or problem.demands or problem.paths
+    return asked and problem.rules.names_robots() and not beside
 
 
 def _for_search(problem: States) -> States:

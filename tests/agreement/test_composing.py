@@ -108,6 +108,15 @@ def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
         walk(graph_of(problem), Ticking(time_limit=8.0))
 
 
+@pytest.mark.slow
+def test_what_must_stand_does_so_without_proof_as_well(engine25):
+    problem = seqopt.pose(
+        engine25, three_robot_loop(engine25.network), EQUATIONS, "sum", stands="dry"
+    )
+    with pytest.raises(InfeasibleError, match="step 25 of 90 has no state that is allowed"):
+        solve(problem, "cascade", proof=False)
+
+
 # schedules, aims, limits, budgets, standing, scenarios, candidates: any of them together
 
 
