@@ -12,7 +12,7 @@ has a bound.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -51,7 +51,7 @@ from seqopt.graph.paths import (
     strictly_below,
     tied,
 )
-from seqopt.graph.space import Space
+from seqopt.graph.space import Key, Space
 from seqopt.graph.states.explored import best_margin, build_space, explore, floors_of_goals
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import RobustAim
@@ -62,7 +62,7 @@ WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
 WIDER = 4  # how many times as wide the second narrow search is
-FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+FAR_BELOW = 1.2  # what the narrow search finds, over the first threshold
 LARGE = 20_000  # states of a cut from which on any of the best paths is enough, not the first
 NARROW = 1.005  # from a target to the incumbent, below which no other target is set
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
@@ -268,20 +268,24 @@ def close_fallen(found: Explorer, visited: Visited, path: Sequence[int]) -> bool
     return fallen
 
 
-def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:
+def exact_best(
+    found: Explorer,
+    budgets: Sequence[float] = (),
+    among: Mapping[Key, Sequence[int]] | None = None,
+) -> tuple[Visited, Best | Within]:
     """Return the best path through visited states, values close to its own being exact.
 
-    Raises `InfeasibleError` if there is none though all states were visited; `NothingFoundError` if
-    some were not.
+    ``among``: as of `Explorer.graph`. Raises `InfeasibleError` if there is none though all states
+    were visited; `NothingFoundError` if some were not.
     """
     while True:
-        visited = found.graph()
+        visited = found.graph(among)
         graph = visited.graph
         try:
             best = within_budgets(graph, budgets) if budgets else lexicographic(graph)
         except InfeasibleError as error:
             raise found.without_plan(str(error)) from None
-        if not found.refine(best.values):
+        if not found.refine(best.values, among):
             return visited, best
 
 
@@ -344,12 +348,25 @@ class ThresholdSearch:
         found = self.incumbent
         return bool(found and not self._caps and all(map(le, found.objective, self.floors)))
 
-    def misses_floor(self) -> bool:
-        """Return whether states up to it, which stay visited, prove that every plan exceeds it."""
-        floor, trial = self.floors[0], self.wide.copy()
-        if not self._cuts or trial.dive(floor) or trial.rise(floor):
-            return False  # what takes as much as the floor would stay visited below a later cut
-        self.wide = trial
+    def misses_floor(self, problem: States) -> bool:
+        """Return whether states up to it, which stay visited, prove that every plan exceeds it.
+
+        It is not known where more models would be solved for that than by a wider search.
+        """
+        floor, trial, most = self.floors[0], self.wide.copy(), (1 + WIDER) * problem.models
+
+        def tell(found: Explorer) -> None:
+            self.wide.tell(found)
+            if problem.models > most:
+                raise _TooManyError
+
+        trial.tell = tell
+        try:
+            if not self._cuts or trial.dive(floor) or trial.rise(floor):
+                return False  # what takes as much as the floor would stay visited below a later cut
+        except _TooManyError:
+            return False
+        self.wide, trial.tell = trial, self.wide.tell
         return trial.excluded > floor
 
     def best(self, start: float = -np.inf) -> Solution:
@@ -423,15 +440,16 @@ class ThresholdSearch:
         if self.wide.passes == 0 or (np.isinf(below) and self.incumbent):
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()
-        way = trial.way() if trial.dive(threshold, below) else None
-        best = None if way is None else lexicographic(way.graph)
-        if way and best and best.values[0] < self._ceiling:
-            if not close_fallen(trial, way, best.path):
-                self.incumbent = selected(trial.space, way, best)
-                return True
-            with suppress(InfeasibleError, NothingFoundError):  # of what stands
-                self.incumbent = best_standing(trial)
-                return True
+        rows = trial.way() if trial.dive(threshold, below) else None
+        if rows:
+            way, best = exact_best(trial, among=rows)
+            if best.values[0] < self._ceiling:
+                if not close_fallen(trial, way, best.path):
+                    self.incumbent = selected(trial.space, way, best)
+                    return True
+                with suppress(InfeasibleError, NothingFoundError):  # of what stands
+                    self.incumbent = best_standing(trial)
+                    return True
         self.wide = trial
         return False
 
@@ -455,7 +473,7 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
         for wider in (1, WIDER):
             if wider > 1 and not many and (search.incumbent or options.dear):
                 break  # it pays where the first one found nothing
-            if wider > 1 and search.incumbent and search.misses_floor():
+            if wider > 1 and search.incumbent and search.misses_floor(problem):
                 break
             plans = [search.incumbent, _first(problem, options, search.floors, wider, tell)]
             search.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
@@ -540,6 +558,10 @@ _Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
 STEPS = 400  # weights that are tried at most
 CLOSE = 1e-9  # differences that are none, over the size of the values
 LABELS = 16_384  # of a level that are continued at most
+
+
+class _TooManyError(Exception):
+    """More models are solved than a wider search would need."""
 
 
 class StopError(Exception):

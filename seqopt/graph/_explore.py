@@ -326,15 +326,21 @@ class Explorer:
                 return fresh
             part.values[close], part.exact[close] = self._exact(key, part.states[close]), True
 
-    def refine(self, values: Sequence[float] | None = None) -> bool:
+    def refine(
+        self,
+        values: Sequence[float] | None = None,
+        among: Mapping[Key, Sequence[int]] | None = None,
+    ) -> bool:
         """Value states exactly that are close to the worst values of a path; return if any were.
 
-        All of them where no values are given.
+        All of them where no values are given; ``among``: as of `graph`.
         """
         found = False
         for parts in self._parts[1:]:
             for key, part in parts.items():
                 close = ~part.exact & (part.mark == OPEN)
+                if among is not None:
+                    close &= np.isin(np.arange(len(close)), among.get(key, ()))
                 near = np.full(len(close), values is None)
                 for column, peak in enumerate(self.space.peaks):
                     if peak and values is not None:
@@ -384,8 +390,8 @@ class Explorer:
         self.nbytes += 2 * rows.nbytes + moves.taken.nbytes
         self.nbytes += (len(to.states) - before) * self._each
 
-    def way(self) -> Visited | None:
-        """Return a path to an end, exactly valued: back from each state to the least before it.
+    def way(self) -> Mapping[Key, Sequence[int]] | None:
+        """Return a path to an end, as rows by part: back from each state to the least before it.
 
         Parts grow as states are discovered, so that a way back within one ends. None where what led
         to a state was excluded since.
@@ -402,10 +408,7 @@ class Explorer:
             _, level, key, row = min(found, key=itemgetter(0))
             rows.setdefault(key, []).append(row)
             if (level, key, row) == (*self._start, 0):
-                for to, path in rows.items():
-                    own = next(parts[to] for parts in self._parts if to in parts)
-                    own.values[path], own.exact[path] = self._exact(to, own.states[path]), True
-                return self.graph(rows)
+                return rows
             found = []
             for level, before, moves in into[key]:
                 part = self._parts[level][before]
