@@ -125,7 +125,10 @@ def composed() -> dict[str, str]:
 
 
 def answer(command: str, folder: Path) -> dict[str, float] | None:
-    """Return the values of every goal, or how many plans a front has; None where it is refused."""
+    """Return the values of every goal, or how many plans a front has; None where it is refused.
+
+    What a plan spends of a budget is its own: other plans that are as good spend another share.
+    """
     (folder / "own.csv").write_text(OPEN, encoding="utf-8")
     words = [str(folder / word) if word in FILES else word for word in command.split()]
     said, refused = io.StringIO(), io.StringIO()
@@ -141,7 +144,9 @@ def answer(command: str, folder: Path) -> dict[str, float] | None:
     if "points" in found:
         return {"points": float(len(found["points"]))}
     del code  # a plan that is no good build has a value, too
-    return {name: float(value) for name, value in found["summary"]["objective"].items()}
+    summary = found["summary"]
+    values, capped = summary["objective"], summary.get("budgets") or {}
+    return {name: float(value) for name, value in values.items() if name not in capped}
 
 
 def stored() -> dict[str, dict[str, float]]:
