@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.arrays import Floats, Terse
+from seqopt.arrays import Bools, Floats, Terse
 from seqopt.errors import ProblemError, message_of
 from seqopt.problem.requirements import (
     NEVER,
@@ -184,6 +184,14 @@ class RankSum(Terse):
             for name, weight in terms
         ]
         return np.asarray(sum(parts) / sum(weight for _, weight in terms))
+
+    def is_close(self, responses: ChoiceResponses, bricks: int, share: float) -> Bools:
+        """Return which choices (C,) an error of a share of a response may round otherwise."""
+        rounding, out = dict(_known(self.resolution, self.name)), []
+        for name, _ in self._terms(bricks):
+            values = np.abs(np.nan_to_num(responses[name] / rounding[name[0]], posinf=0.0))
+            out.append(np.abs(values % 1.0 - 0.5) <= share * values)
+        return np.asarray(np.any(out, axis=0))
 
     def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:
         return self.before if bricks < _known(self.crown, self.name) else self.after

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt._registry import ADDED
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.plan.pose import graph_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.amounts import BUILT_IN, find_amount
 from seqopt.problem.criteria import (
@@ -26,13 +27,14 @@ from seqopt.problem.criteria import (
 )
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.problem import parse_budgets
-from seqopt.problem.requirements import NEVER, ROUNDED, Units
+from seqopt.problem.requirements import NEVER, ROUNDED, Limit, Units
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
 
 PACKAGE = """
 import numpy as np
+from seqopt.plan.pose import graph_of
 from seqopt.problem import Amount, Filter
 
 BUSY = Amount("busy", lambda states: (states.nodes >= 0).sum(axis=1))
@@ -342,3 +344,40 @@ def test_ranks_are_those_of_pandas(values):
     found = _mean_ranks(np.array(values, dtype=float))
     assert found.tolist() == pd.Series(values).rank().tolist()
     assert found.sum() == pytest.approx(len(values) * (len(values) + 1) / 2)
+
+
+@given(
+    value=st.floats(1e-3, 1e6),
+    resolution=st.sampled_from([0.01, 0.1, 1.0, 7.0]),
+    error=st.floats(-1.0, 1.0),
+    share=st.sampled_from([1e-5, 1e-3]),
+)
+def test_what_is_not_close_is_rounded_alike_with_any_error_of_the_share(
+    value, resolution, error, share
+):
+    ranks = RankSum("own", equal("T_max"), equal("T_max"), NEVER, 0, (("T", resolution),))
+    found = {"T_max": np.array([value, (np.floor(value) + 0.5) * resolution, np.inf])}
+    close = ranks.is_close(found, 3, share)
+    moved = value * (1.0 + 0.999 * share * error)
+    assert close[0] or np.round(value / resolution) == np.round(moved / resolution)
+    assert close[1]  # a control: it lies where rounding turns
+    assert not close[2]  # what is impossible has no rank
+
+
+def test_ranks_by_six_digits_are_those_by_all_of_them():
+    network = seqopt.build_network(small_arch(9))
+    engine = seqopt.make_engine("compliance", network)
+    criterion = seqopt.CRITERIA["equations-2-3"]
+    problem = graph_of(seqopt.pose(engine, seqopt.three_robot_loop(network), criterion))
+    exact = replace(problem, limits=(Limit("T_max", 1e9),), answers={}, judged={})
+    assert problem.screened is not problem.sets
+    assert exact.screened is exact.sets
+    ranked = 0
+    for level in range(1, 1 + problem.space.levels):
+        if problem.space.open_columns(level):
+            states = problem.space.candidates(level).states
+            own, all_digits = (each.candidates.among(level, states) for each in (problem, exact))
+            assert own.tolist() == all_digits.tolist()
+            ranked += len(states)
+    assert problem.six_digit_models > 0.5 * ranked
+    assert problem.sets.solved < 0.2 * ranked

@@ -44,7 +44,7 @@ class CandidateCosts:
         if (level, alone) not in self._costs:
             if alone and isinstance(criterion, RankSum):
                 criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
-            found = problem.seen(level, candidates.states).responses
+            found = problem.seen(level, candidates.states, rough=True).responses
             shaped = {name: candidates.spread(values) for name, values in found.items()}
             self._costs[level, alone] = self._relative(level, criterion, shaped)
         return np.asarray(self._costs[level, alone][candidates.rows(states)])
@@ -70,7 +70,7 @@ class CandidateCosts:
         problem = self._problem
         if not (len(states) and problem.space.open_columns(level)):
             return np.zeros(len(states))
-        seen, fits = problem.responses(level, states)
+        seen, fits = problem.responses(level, states, rough=problem.is_relative)
         if not problem.is_relative:
             costs = state_costs(problem.criterion, seen.responses, seen.bricks, seen.possible)
         else:
@@ -78,7 +78,8 @@ class CandidateCosts:
             every = self._of(level).states
             every = every[(every[:, chosen] == states[0, chosen]).all(axis=1)]
             every = every[np.argsort(every[:, last])]
-            costs = self._relative(level, problem.criterion, problem.seen(level, every).responses)
+            found = problem.seen(level, every, rough=True).responses
+            costs = self._relative(level, problem.criterion, found)
             costs = costs[np.searchsorted(every[:, last], states[:, last])]
         return np.where(fits, costs, np.inf)
 

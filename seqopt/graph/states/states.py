@@ -28,7 +28,7 @@ from seqopt.problem.amounts import (
     StateArrays,
     judged_by,
 )
-from seqopt.problem.criteria import _counts_every_step
+from seqopt.problem.criteria import RankSum, _counts_every_step
 from seqopt.problem.filters import Filter, filters_of
 from seqopt.problem.problem import (
     WORST_PEAK,
@@ -44,7 +44,7 @@ from seqopt.problem.problem import (
 from seqopt.problem.requirements import Criterion, Limit, state_costs
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses._grip_sets import GripSets, _near
+from seqopt.responses._grip_sets import BAND, GripSets, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
@@ -335,9 +335,9 @@ class States(Shown):
 
     @property
     def screened(self) -> GripSets:
-        """Responses in single precision, to search by: enough where only worst values count."""
+        """Responses in single precision, to search by: enough for worst values, and for ranks."""
         whole = any(goal.states and not goal.has_few_digits for goal in self.goals)
-        return self._sets(screen=not (self.filters or whole or self.is_relative))
+        return self._sets(screen=self._by_ranks or not (self.filters or whole or self.is_relative))
 
     def _sets(self, *, screen: bool) -> GripSets:
         names = tuple(name for name in self.named if name != LARGEST)
@@ -351,7 +351,8 @@ class States(Shown):
         """How many grip sets were solved."""
         if self.each:
             return sum(problem.models for problem in self.each)
-        return self.sets.solved + self.six_digit_models
+        again = self.sets.solved if self._by_ranks else 0  # all were solved with six digits before
+        return self.sets.solved + self.six_digit_models - again
 
     @property
     def six_digit_models(self) -> int:
@@ -391,14 +392,12 @@ class States(Shown):
         (held, most), bricks = self._grips(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
         if rough and self.screened is not self.sets:
-            close = self._close(answers, forces, most)
+            close = self._close(bricks, self._by_name(level, states, answers, forces), forces, most)
             if close.any():
                 answers[close], forces[close] = self.sets.answers(bricks, held[close])
         fits = np.asarray(np.isfinite(np.column_stack([answers, forces])).all(axis=1))
-        found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
-        if self._of_each:
-            found |= self._of_robots(level, states, forces)
-        nodes = self._node_numbers[places]
+        found = self._by_name(level, states, answers, forces)
+        nodes = self._node_numbers[states[:, : self.space.robots].clip(min=0)]
         return StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
 
     def _of_robots(self, level: int, states: Ints, forces: Floats) -> dict[str, Floats]:
@@ -445,15 +444,26 @@ class States(Shown):
         """All that states must pass: rules, standing, payloads, arms, limits, and others."""
         return filters_of(self)
 
-    def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
+    @cached_property
+    def _by_ranks(self) -> bool:
+        """Whether ranks among candidates are all that is asked of states."""
+        return self._by_candidates and isinstance(self.criterion, RankSum)
+
+    def _by_name(
+        self, level: int, states: Ints, answers: Floats, forces: Floats
+    ) -> dict[str, Floats]:
+        """Return the responses of states (n,) by name."""
         found = dict(zip(self.sets.names, answers.T, strict=True))
         found[LARGEST] = forces.max(axis=1, initial=0.0)
-        return found
+        return found | (self._of_robots(level, states, forces) if self._of_each else {})
 
-    def _close(self, answers: Floats, forces: Floats, most: Floats) -> Bools:
-        """Return which states are too close to a limit for single precision, (n,)."""
+    def _close(
+        self, bricks: int, found: Mapping[str, Floats], forces: Floats, most: Floats
+    ) -> Bools:
+        """Return which states single precision may round or limit otherwise, (n,)."""
+        if isinstance(self.criterion, RankSum):
+            return self.criterion.is_close(found, bricks, BAND)
         close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
-        found = self._by_name(answers, forces)
         for limit in self.limits:
             if limit.response in found:
                 close |= _near(found[limit.response], limit.counted)
