@@ -269,9 +269,7 @@ def close_fallen(found: Explorer, visited: Visited, path: Sequence[int]) -> bool
 
 
 def exact_best(
-    found: Explorer,
-    budgets: Sequence[float] = (),
-    among: Mapping[Key, Sequence[int]] | None = None,
+    found: Explorer, budgets: Sequence[float] = (), among: Mapping[Key, Sequence[int]] | None = None
 ) -> tuple[Visited, Best | Within]:
     """Return the best path through visited states, values close to its own being exact.
 
