@@ -26,7 +26,7 @@ from seqopt.problem.filters import Filter, parse_limits
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import LARGEST, Criterion, Limit, number_word, split_word
 from seqopt.problem.standing import Standing
-from seqopt.responses.resources import Resources
+from seqopt.responses._grip_sets import Resources
 from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios

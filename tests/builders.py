@@ -15,7 +15,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, _check_part
-from seqopt.stability._held_states import HeldStates
+from seqopt.stability._screens import HeldStates
 from seqopt.stability.assessment import bonded
 
 ROOT = Path(__file__).parents[1]

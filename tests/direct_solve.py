@@ -9,10 +9,8 @@ from scipy import linalg
 
 from experiments.placement.parts.staged import spring_maps
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import Fields, _join_sets, no_sets
-from seqopt.engines.rigid._mechanism import require_resistance
-from seqopt.engines.rigid._mixed import Solution, respond
+from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, no_sets
+from seqopt.engines.rigid._mixed import Solution, require_resistance, respond
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import Statics, build_statics, node_motion
 from seqopt.network.network import Network

@@ -12,16 +12,14 @@ from scipy import sparse
 
 import seqopt
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
-from seqopt.engines._grip_compliance import RIGID, read_compliance
+from seqopt.contact.mortar import face_quadrature, find_elastic_limits
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._system import build_system, settle
 from seqopt.engines.discrete.engine import _held_nodes
-from seqopt.engines.interface import Want
+from seqopt.engines.interface import RIGID, Want, read_compliance
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import share, ungripped_system
-from seqopt.engines.rigid._mixed import Solution, mixed_system
+from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system
 from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import touching_faces
@@ -30,9 +28,9 @@ from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces
 from seqopt.scene.shape import Surface
 from seqopt.stability._load_factor import load_factor
-from seqopt.stability._prover import Prover
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import assess, bonded
+from seqopt.stability.limit_analysis import Prover
 from tests.blocks import box
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)

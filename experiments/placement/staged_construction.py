@@ -37,7 +37,7 @@ from experiments.placement.parts.staged import (
 )
 from seqopt import Network, Step, three_robot_loop
 from seqopt.engines.interface import Fields
-from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
+from seqopt.engines.rigid._mixed import Ungripped, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.table import step_fields

@@ -42,9 +42,8 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.network.network import GROUND
 from seqopt.report._style import styled
-from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.assessment import Verdict, bonded, verdict
-from seqopt.stability.limit_analysis import Case, Sense, compile_equilibrium
+from seqopt.stability.limit_analysis import Case, Proven, Prover, Sense, compile_equilibrium
 
 NARROW = 1e-5  # between what is proven to fall and to stand
 ROUGH = 5.0  # friction with which no arch slides

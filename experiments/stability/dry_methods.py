@@ -33,9 +33,9 @@ from seqopt.network.network import GROUND
 from seqopt.report._style import GRAY, dress, looks, name_panels, plain, styled
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.methods import METHODS, three_robot_loop
-from seqopt.stability._prover import Prover
 from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import MARGINS, bonded
+from seqopt.stability.limit_analysis import Prover
 from seqopt.study.published import EQUATIONS
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4

@@ -54,9 +54,8 @@ from experiments.stability.parts.witness_cra import (
 )
 from experiments.stability.parts.witness_lmgc90 import moved_by, python_with_lmgc90
 from seqopt.contact.mortar import Mortar
-from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.limit_analysis import compile_equilibrium
+from seqopt.stability.limit_analysis import Prover, compile_equilibrium
 
 SOONER = 5.0
 LARGEST = "armadillo_cra"

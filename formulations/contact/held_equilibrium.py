@@ -31,7 +31,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.stability._held_states import Enough, HeldProgram
+from seqopt.stability._screens import Enough, HeldProgram
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, limits
 
 _SIDES = 8  # of a cone to start with, the axes of its contact among them

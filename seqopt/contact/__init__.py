@@ -13,7 +13,7 @@ A partial structure and its grips become rigid blocks with faces between them:
 Joints stay elastic as long as the stress on their faces is less than the strength of the mortar:
 
 >>> import numpy as np
->>> from seqopt.contact._elastic_limits import find_elastic_limits
+>>> from seqopt.contact.mortar import find_elastic_limits
 >>> wrench = np.zeros((1, 26, 6))
 >>> wrench[0, 0, 0] = 1000.0  # N on the first brick
 >>> [bool(find_elastic_limits(network, m).exceeded(wrench)[0]) for m in (DRY, EPOXY)]

@@ -21,10 +21,22 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines._grip_compliance import RIGID, GripCompliance, read_compliance
-from seqopt.engines.interface import Engine, Fields, Want, grip_columns
-from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
-from seqopt.engines.rigid._mixed import MixedSystem, mixed_system, solve_mixed
+from seqopt.engines.interface import (
+    RIGID,
+    Engine,
+    Fields,
+    GripCompliance,
+    Want,
+    grip_columns,
+    read_compliance,
+)
+from seqopt.engines.rigid._mixed import (
+    MixedSystem,
+    free_motion,
+    mixed_system,
+    solve_mixed,
+    ungripped_system,
+)
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import GROUND, Network
 

@@ -18,9 +18,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance, grip_springs
-from seqopt.engines.interface import Fields, SerialEngine
-from seqopt.engines.rigid._mechanism import require_resistance
+from seqopt.engines.interface import Fields, GripCompliance, SerialEngine, grip_springs
+from seqopt.engines.rigid._mixed import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
-from seqopt.contact.mortar import EPOXY, Mortar, find_mortar
+from seqopt.contact.mortar import EPOXY, ElasticLimits, Mortar, find_elastic_limits, find_mortar
 from seqopt.engines.interface import (
     Engine,
     Fields,

@@ -17,8 +17,7 @@ from seqopt.judge._rule_moves import Choices
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values
 from seqopt.problem.amounts import LARGEST, StateArrays
-from seqopt.responses._blocks import Block
-from seqopt.responses._grip_sets import KnownRows, solve_sets
+from seqopt.responses._grip_sets import Block, KnownRows, solve_sets
 from seqopt.responses.quantities import robot_response
 
 Responses = Mapping[str, Floats]

@@ -20,8 +20,7 @@ from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses._blocks import Block
-from seqopt.responses._grip_sets import solve_sets
+from seqopt.responses._grip_sets import Block, solve_sets
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.schedule import Schedule
 

@@ -17,16 +17,17 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
-from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, step_tolerance
 from seqopt.responses.quantities import _props_table
 from seqopt.responses.table import (
     Departure,
+    Enough,
     LinearRange,
     _analyzed,
     _Columns,
     _table_of,
     grips_table,
+    what_was_enough,
 )
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._steps import assess_steps, stability_table, step_verdicts

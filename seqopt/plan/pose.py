@@ -15,7 +15,7 @@ from seqopt.problem.filters import Filter
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
 from seqopt.problem.requirements import Criterion, Limit, require_parts
 from seqopt.problem.standing import Standing
-from seqopt.responses.resources import HERE, Resources
+from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules

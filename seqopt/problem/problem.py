@@ -35,9 +35,9 @@ from seqopt.problem.requirements import (
 )
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing
+from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
-from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules

@@ -17,7 +17,7 @@ from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses._tolerance import is_tolerance, misfits_along
+from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     EXCESS_COLUMN,
     NO_TOLERANCE,
@@ -459,7 +459,7 @@ def _response_along(scene: Scene, table: _Columns, name: str) -> np.ndarray:
         least = np.asarray(table[RESPONSES["F_min"].column], dtype=float)
         return np.asarray(np.maximum(-least, 0.0))
     if is_tolerance(name):
-        return misfits_along(table)
+        return misfits_along(table[COLUMN])
     if name == PROP_EXCESS:
         return np.asarray(table[EXCESS_COLUMN], dtype=float)
     if name in RESPONSES:

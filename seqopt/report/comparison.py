@@ -24,11 +24,18 @@ from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
 from seqopt.report._regret._measure import measure_regret
 from seqopt.report._regret._table import RegretTable
-from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._grip_sets import Resources
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
-from seqopt.responses.resources import Resources
-from seqopt.responses.table import Departure, LinearRange, _steps_in_table, analyze, force_column
+from seqopt.responses.table import (
+    Departure,
+    Enough,
+    LinearRange,
+    _steps_in_table,
+    analyze,
+    force_column,
+    what_was_enough,
+)
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS, modified_sequential
 from seqopt.sequence.rules import FREE, FreeRules

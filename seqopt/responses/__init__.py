@@ -15,8 +15,8 @@ largest tension. `analyze` returns them as a table for given steps, each compute
 114.6
 """
 
+from seqopt.responses._grip_sets import Resources
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
-from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
 
 __all__ = ["RESPONSES", "Resources", "Response", "analyze", "responses_of"]

@@ -5,23 +5,179 @@ For searches that need few of many sets: the sets of a request are solved in bat
 
 from __future__ import annotations
 
+import pickle
+import threading
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from operator import or_
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Engine, linear_limit
-from seqopt.errors import MechanismError
-from seqopt.responses._blocks import BLOCK, COMPILED, Answers, Block, answer, packed, unpacked, work
-from seqopt.responses.resources import HERE, Resources
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines.interface import Engine, Want, linear_limit
+from seqopt.engines.registry import Recipe, recipe_of
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import MechanismError, ProblemError, SceneError
+from seqopt.responses._tolerance import misfits
+from seqopt.responses.quantities import (
+    CHOSEN_BY,
+    EXTREMES,
+    PROP_EXCESS,
+    TOLERANCE,
+    _excess_of,
+    lengths,
+    require_finite,
+)
 from seqopt.sequence.steps import Step
+from seqopt.work._threads import one_thread
 from seqopt.work._workers import hire, map_ordered
-from seqopt.work.progress import Progress
+from seqopt.work.progress import Progress, Tell
+
+
+@dataclass(frozen=True)
+class Resources:
+    """What a computation may use; no result depends on it.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes to share the work among; with an executor, how many tasks it works on at once.
+    executor : concurrent.futures.Executor, optional
+        Any executor, instead of processes of our own. The caller ends it.
+    progress : callable, optional
+        Called with the progress, in a few words, of computations longer than a second.
+
+    Raises
+    ------
+    ProblemError
+        If a number is none that can be meant.
+
+    Examples
+    --------
+    >>> Resources(workers=2).workers
+    2
+    """
+
+    workers: int = 1
+    executor: Executor | None = None
+    progress: Tell | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.workers, bool) or not isinstance(self.workers, int) or self.workers < 1:
+            raise ProblemError(f"workers is {self.workers!r}; give a whole number from 1")
+        if not (self.executor is None or hasattr(self.executor, "submit")):
+            raise ProblemError(
+                f"executor: a {type(self.executor).__name__} is not an executor; "
+                "give one of concurrent.futures, or workers"
+            )
+
+    def alone(self) -> Resources:
+        """Return resources for little work: one process, without progress."""
+        return replace(self, workers=1, executor=None, progress=None)
+
+
+HERE = Resources()
+"""This process alone."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Block(FrozenValue):
+    """States with one brick count, and the requested responses."""
+
+    bricks: int  # how many bricks stand
+    grips: Ints  # (S, r); numbers of grips, as `seqopt.Scene.grip_numbers` has them
+    names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
+    screen: bool = True  # whether six digits are enough
+    props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
+    compiled: bool = False  # whether there is so much to do that loading compiled loops pays
+
+    @property
+    def work(self) -> float:
+        """Estimated work, without unit: it grows with the bricks."""
+        return work(len(self.grips), self.bricks)
+
+
+COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
+
+
+def work(states: int, bricks: int) -> float:
+    """Return the estimated work of states, without unit."""
+    return float(states * (bricks + 20))  # 20: what every state costs, however small it is
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Answers(FrozenValue):
+    """The requested responses of a block (S,), SI units, and sizes of grip forces (S, r), N."""
+
+    values: Mapping[str, Floats]
+    forces: Floats
+
+
+def answer(engine: Engine, block: Block) -> Answers:
+    """Return the responses of a block of states. Raises what the engine does."""
+    asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
+    want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
+    sets, robots = block.grips.shape
+    grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
+    if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
+        with one_thread():
+            found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
+        forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
+        return Answers({name: EXTREMES[name](found) for name in block.names}, forces)
+    with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
+        fields = engine.solve(block.bricks, grips, want)
+    forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
+    network, bricks = engine.network, block.bricks
+    values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
+    if TOLERANCE in block.names:
+        with one_thread():
+            values[TOLERANCE] = misfits(engine, bricks, grips)
+    if PROP_EXCESS in block.names:
+        props = [network.scene.prop_of_number[number] for number in block.props]
+        values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
+    return Answers(values, forces)
+
+
+def packed(engine: Engine) -> bytes:
+    """Pickle the recipe of an engine, or the engine itself if it has none.
+
+    Raises `SceneError` if a user's engine cannot be pickled.
+    """
+    recipe = recipe_of(engine)
+    known = recipe is not None and recipe.network == engine.network  # else it makes another engine
+    try:
+        return pickle.dumps(recipe if known else engine)
+    except Exception as error:  # foreign code may raise any error
+        raise SceneError(
+            f"engine {type(engine).__name__}: it cannot be sent to other processes ({error}); take "
+            "one of seqopt.make_engine, or let this process work alone"
+        ) from error
+
+
+# Engines of the last two runs of each thread of a worker: executors of users have no storage for
+# workers' data between tasks, each of which would build its engine again.
+_OF_THREAD = threading.local()
+
+
+def unpacked(engine: Engine | bytes) -> Engine:
+    """Return an engine unchanged, or the one of a `packed` form, built once for a thread."""
+    if not isinstance(engine, bytes):
+        return engine
+    made: dict[bytes, Engine] = vars(_OF_THREAD).setdefault("engines", {})
+    if engine not in made:
+        found: Recipe | Engine = pickle.loads(engine)  # our own, of `packed`
+        made[engine] = found.make() if isinstance(found, Recipe) else found
+        if len(made) > 2:
+            del made[next(iter(made))]
+    return made[engine]
+
+
+BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
 
 
 class KnownRows:
@@ -77,7 +233,7 @@ class GripSets:
     ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
     that are wanted; ``resources``: who solves them; ``screen``: whether six digits are enough, to
     choose by; ``loose``: whether responses of mechanisms are infinite instead of raising a
-    `MechanismError`; ``work``: that is known to come, as `seqopt.responses._blocks.work` has it.
+    `MechanismError`; ``work``: that is known to come, as `seqopt.responses._grip_sets.work` has it.
 
     >>> import numpy as np
     >>> import seqopt

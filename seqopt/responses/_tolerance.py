@@ -22,18 +22,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import groupby
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, OpeningEngine, Want, grip_columns
 from seqopt.engines.registry import AutoEngine
 from seqopt.errors import ProblemError
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
-from seqopt.responses.table import _Columns, _grips_of, _Held, _Key
 from seqopt.sequence.steps import Step
 
 COLUMN = "tolerance_mm"
@@ -155,7 +153,8 @@ def misfits(engine: Engine, bricks: int, grips: Ints) -> Floats:
 
 def step_tolerance(engine: Engine, step: Step) -> Tolerance:
     """Return the tolerance of the grips of a step, with its proven lower bound."""
-    scene, grips = engine.network.scene, _grips_of(engine.network.scene, step)
+    scene = engine.network.scene
+    grips = np.array([scene.grip_numbers(step.grips, step.bricks)]).reshape(1, -1)
     pairs = zip(scene.robots, step.grips, strict=True)
     holding = [robot.name for robot, node in pairs if node is not None]
     holding += [prop.label for prop in scene.standing_props(step.bricks, held=bool(holding))]
@@ -174,34 +173,15 @@ def step_tolerance(engine: Engine, step: Step) -> Tolerance:
     return Tolerance(1 / rates[at], 1 / highest.max(), what, tuple(map(tuple, far.tolist())))
 
 
-def each_tolerance(
-    engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
-) -> Floats:
-    """Return the tolerance of grips of every step, m.
-
-    Steps of equal numbers of bricks and grips are solved as one batch, equal states once.
-    ``known``: cache by bricks and grips, updated in place.
-    """
-    known = {} if known is None else known
-    new = {(bricks, len(held), held) for _, bricks, held in steps if (bricks, held) not in known}
-    for (bricks, count), same in groupby(sorted(new), key=itemgetter(0, 1)):
-        sets = [held for *_, held in same]
-        grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
-        for held, misfit in zip(sets, misfits(engine, bricks, grips).tolist(), strict=True):
-            off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
-            known[bricks, held] = off
-    return np.array([known[bricks, held] for _, bricks, held in steps], dtype=float)
-
-
 def tolerances_along(engine: Engine, steps: Sequence[Step]) -> list[float]:
     """Return the tolerances of steps, mm."""
     return [1e3 * step_tolerance(engine, step).distance for step in steps]
 
 
-def misfits_along(table: _Columns) -> Floats:
-    """Return the reciprocals of the tolerances in a table of steps, 1/m."""
+def misfits_along(tolerances: ArrayLike) -> Floats:
+    """Return the reciprocals of tolerances in mm, 1/m."""
     with np.errstate(divide="ignore"):
-        return np.asarray(np.minimum(1e3 / np.asarray(table[COLUMN], dtype=float), NO_TOLERANCE))
+        return np.asarray(np.minimum(1e3 / np.asarray(tolerances, dtype=float), NO_TOLERANCE))
 
 
 # the worst direction

@@ -15,7 +15,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.engines.rigid._extremes import Extremes
+from seqopt.engines.rigid.compliance import Extremes
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.parts import Prop

@@ -20,9 +20,8 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
-from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _first_to_fail, _verdict_of, bonded
-from seqopt.stability.limit_analysis import CAP, GAP, Claim, Sense, compile_equilibrium
+from seqopt.stability.limit_analysis import CAP, GAP, Claim, Prover, Sense, compile_equilibrium
 from seqopt.work.progress import Tell, with_progress
 
 _ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest

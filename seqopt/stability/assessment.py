@@ -12,16 +12,19 @@ from seqopt._showing import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
-from seqopt.stability._prover import DIRECTIONS, Proven, Prover, safe_pull
 from seqopt.stability.limit_analysis import (
     CAP,
+    DIRECTIONS,
     EXACT,
     LARGEST_FORCE,
     Case,
     Claim,
     Compile,
+    Proven,
+    Prover,
     Sense,
     compile_equilibrium,
+    safe_pull,
 )
 
 CONES = "cone program"  # what proves a verdict where nothing simpler does
@@ -62,8 +65,8 @@ class Stability(Shown, FrozenValue):
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
         Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
-        less than the largest such tilt by what `seqopt.stability._prover.safe_pull` leaves, and
-        for bonds and for grips at their payload by what weighs less once it is turned.
+        less than the largest such tilt by what `safe_pull` leaves, and for bonds and for grips at
+        their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
         payload is enough, 0 if nothing grips, NaN where props only push.

@@ -24,9 +24,9 @@ from seqopt.network.build import build_network
 from seqopt.network.network import GROUND
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
-from seqopt.stability._prover import horizontal
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.stability.limit_analysis import horizontal
 from seqopt.work.progress import Tell, with_progress
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
-from seqopt.stability._verdict_chain import VerdictChain
+from seqopt.stability._steps import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there

@@ -15,7 +15,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
-from seqopt.stability._held_states import node_assembly
+from seqopt.stability._screens import node_assembly
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import EXACT, LARGEST_FORCE, contact_work, limits
 from seqopt.times._curing import JointsInTime

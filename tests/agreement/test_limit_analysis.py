@@ -17,9 +17,9 @@ from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
+from seqopt.stability.limit_analysis import Prover
 from tests.strategies import arches
 
 

@@ -112,7 +112,7 @@ def test_assess_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
 def test_assess_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
     """A solver out of time is neither 'stands' nor 'does not stand'; the table is still written."""
     monkeypatch.setattr("formulations.contact.limit_analysis.SECONDS", 1e-9)
-    monkeypatch.setattr("seqopt.stability._verdict_chain.approach", lambda *_: iter(()))
+    monkeypatch.setattr("seqopt.stability._steps.approach", lambda *_: iter(()))
     plan, out = tmp_path / "plan.csv", tmp_path / "out.csv"
     plan.write_text(
         "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n", encoding="utf-8"

@@ -11,9 +11,15 @@ import pytest
 
 from experiments.harness.scenes import running_bond
 from experiments.stability.parts.blocks import stack
-from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import bare_assembly, step_assembly
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong
+from seqopt.contact.mortar import (
+    DRY,
+    EPOXY,
+    Mortar,
+    _is_as_strong,
+    face_quadrature,
+    find_elastic_limits,
+)
 from seqopt.engines.registry import AutoEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network

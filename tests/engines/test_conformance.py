@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.contact._elastic_limits import find_elastic_limits
-from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar
+from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar, find_elastic_limits
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import ENGINES, REASONS, AutoEngine

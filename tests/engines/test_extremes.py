@@ -10,18 +10,16 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
-from seqopt.engines.interface import _NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, Want, grip_columns, read_compliance
 from seqopt.engines.registry import ENGINES
-from seqopt.engines.rigid import _extremes, _growth
-from seqopt.engines.rigid._extremes import extremes_in
+from seqopt.engines.rigid import _growth
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, can_compile, extremes_in
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
-from seqopt.responses._blocks import Block, answer
+from seqopt.responses._grip_sets import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
 from seqopt.work._threads import one_thread
@@ -29,7 +27,7 @@ from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arc
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened
 
-needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
+needs_numba = pytest.mark.skipif(not can_compile(), reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 CLOSE = 1e-12  # of what is largest
@@ -122,8 +120,9 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
     network = build_network(load_scene("dome163"))
     sets, found = sets_of(network, 60, 3), []
     for threads in (1, 3):
-        for module in (_extremes, _growth):
-            monkeypatch.setattr(module, "cores", lambda threads=threads: threads)
+        for module in ("_extremes", "_growth"):
+            name = f"seqopt.engines.rigid.{module}.cores"
+            monkeypatch.setattr(name, lambda threads=threads: threads)
         monkeypatch.setattr(_growth, "_AT_ONCE", 2**12)
         engine = ComplianceEngine(network)
         found.append(engine._extremes(60, sets, Want.RESPONSES, compiled=True))
@@ -150,7 +149,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
         "def refuse(*_, **__): raise OSError('read only')\n"
         "tempfile.TemporaryFile = refuse\n"  # what numba tries folders by
         "import numpy as np\n"
-        "from seqopt.engines.rigid._compiled import _add_six as add\n"
+        "from seqopt.engines.rigid._extremes import _add_six as add\n"
         "out = np.zeros(2)\n"
         "add(out, np.ones((6, 2)), 0, np.ones(6))\n"
         "print(out[0], type(add._cache).__name__)\n"
@@ -162,7 +161,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
 
 def test_without_numba_fields_answer(monkeypatch):
     monkeypatch.setattr("seqopt.engines.rigid.compliance.can_compile", lambda: False)
-    monkeypatch.setattr("seqopt.engines.rigid.compliance.GrownExtremes", None)
+    monkeypatch.setitem(sys.modules, "seqopt.engines.rigid._extremes", None)  # not imported
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = sets_of(engine.network, 6, 2, 10)
     asked = engine._extremes(6, sets, Want.RESPONSES, compiled=True)

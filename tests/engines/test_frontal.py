@@ -13,16 +13,14 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.scenes import grip_sets, half_circle, running_bond
-from seqopt.engines._grip_compliance import read_compliance
-from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.interface import Want, grip_columns, read_compliance
 from seqopt.engines.rigid import _growth as growth
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._frontal import FrontalFactor, FrontalSystem
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import LAST_CORRECTION
-from seqopt.engines.rigid._mixed import solve_mixed
+from seqopt.engines.rigid._mixed import LAST_CORRECTION, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine

@@ -13,11 +13,9 @@ from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _refinement as refinement
-from seqopt.engines.rigid._grip_equations import grip_forces, well_conditioned
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import require_resistance
-from seqopt.engines.rigid._mixed import solve_mixed
-from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._mixed import require_resistance, solve_mixed
+from seqopt.engines.rigid._operator import OperatorBuilder, grip_forces, well_conditioned
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network

@@ -9,9 +9,8 @@ import pytest
 
 import seqopt
 from seqopt.arms import _permits
-from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines.diagnosis import Finding, diagnose
-from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.interface import Want, grip_columns, read_compliance
 from seqopt.engines.registry import engine_for, make_engine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine

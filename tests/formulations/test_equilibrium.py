@@ -31,9 +31,8 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
-from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.limit_analysis import CAP, GAP, Case, Claim, Sense, limits
+from seqopt.stability.limit_analysis import CAP, GAP, Case, Claim, Prover, Sense, limits
 from tests.brute_force import ONES as FOUR_ONES
 from tests.brute_force import allowed, least_peak, peaks, whole_graph
 from tests.builders import held, small_arch

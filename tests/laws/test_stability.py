@@ -17,9 +17,9 @@ from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._prover import Prover
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from seqopt.stability.assessment import Verdict, assess, bonded
+from seqopt.stability.limit_analysis import Prover
 from tests.builders import about_vertical, held, moved, scaled
 from tests.strategies import arches
 

@@ -23,10 +23,16 @@ from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
-from seqopt.responses import _blocks as batches
-from seqopt.responses._enough import what_was_enough
+from seqopt.responses import _grip_sets as batches
 from seqopt.responses.quantities import responses_of
-from seqopt.responses.table import LinearRange, _each_fields, analyze, force_column, step_fields
+from seqopt.responses.table import (
+    LinearRange,
+    _each_fields,
+    analyze,
+    force_column,
+    step_fields,
+    what_was_enough,
+)
 from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study.published import EQUATIONS

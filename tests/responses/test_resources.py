@@ -26,9 +26,8 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import CHOICE_RESPONSES, Limit
 from seqopt.responses import _grip_sets as division
-from seqopt.responses._blocks import Block, answer, packed
+from seqopt.responses._grip_sets import Block, Resources, answer, packed
 from seqopt.responses.quantities import RESPONSES, robot_response
-from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene

@@ -13,8 +13,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.scene.scene_file import dump_scene
 from seqopt.stability import _builds, _steps
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
-from seqopt.stability._steps import each_verdict
-from seqopt.stability._verdict_chain import VerdictChain
+from seqopt.stability._steps import VerdictChain, each_verdict
 from seqopt.stability.assessment import Verdict, verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"

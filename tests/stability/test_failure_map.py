@@ -15,11 +15,11 @@ from seqopt.exchange.imports import import_scene
 from seqopt.report import _failures
 from seqopt.report._failures import cure_words, failure_blocks, usual_builds
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
+from seqopt.stability.limit_analysis import Prover
 from tests.documents import box, obj
 
 FRICTIONS = (0.15, 0.45)

@@ -20,13 +20,11 @@ from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability import _prover as prover
-from seqopt.stability import _verdict_chain as chain
+from seqopt.stability import _steps as chain
 from seqopt.stability import assessment, limit_analysis
-from seqopt.stability._prover import Proven, Prover
 from seqopt.stability._steps import _MARGINS, format_rows, stability_table
 from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
-from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
+from seqopt.stability.limit_analysis import CAP, EXACT, Claim, Proven, Prover, bound, violation
 
 SLIPPERY = Mortar(friction=1e-3)
 
@@ -218,7 +216,7 @@ WEAKER = {
     "the value makes it fall": (assessment, "_verdict_of", None),
     "closing is free": (limit_analysis, "LARGEST_FORCE", 0.0),
     "any closing is charged": (limit_analysis, "_CLOSING", CAP),
-    "forces may violate": (prover, "violation", lambda *_: 0.0),
+    "forces may violate": (limit_analysis, "violation", lambda *_: 0.0),
 }
 WEAKER_CHAIN = {
     "the value is believed": (chain, "judged", believed),

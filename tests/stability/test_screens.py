@@ -20,10 +20,18 @@ from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._load_factor import load_factors
-from seqopt.stability._prover import _MORE, DIRECTIONS, Prover, hulls, safe_pull, sideways
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, held_places
 from seqopt.stability.assessment import Verdict, assess, bonded
-from seqopt.stability.limit_analysis import EXACT, Claim
+from seqopt.stability.limit_analysis import (
+    _MORE,
+    DIRECTIONS,
+    EXACT,
+    Claim,
+    Prover,
+    hulls,
+    safe_pull,
+    sideways,
+)
 from tests.builders import small_arch
 
 

@@ -23,7 +23,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability import _verdict_chain as chain
+from seqopt.stability import _steps as chain
 from seqopt.stability import assess
 from seqopt.stability._steps import (
     assess_steps,

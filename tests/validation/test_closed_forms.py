@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import DRY, BedStiffness, Mortar
-from seqopt.engines._grip_compliance import RIGID
 from seqopt.engines.discrete._system import build_system, settle
 from seqopt.engines.discrete.engine import DiscreteEngine, _held_nodes
-from seqopt.engines.interface import Want
+from seqopt.engines.interface import RIGID, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
 from seqopt.network.build import build_network

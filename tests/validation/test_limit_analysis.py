@@ -15,11 +15,9 @@ from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.scene.parts import Robot
-from seqopt.stability._held_states import HeldStates
-from seqopt.stability._prover import sideways
-from seqopt.stability._screens import STANDS, Margins, Screen, _decided, _narrow
+from seqopt.stability._screens import STANDS, HeldStates, Margins, Screen, _decided, _narrow
 from seqopt.stability.assessment import Verdict, assess, bonded
-from seqopt.stability.limit_analysis import EXACT
+from seqopt.stability.limit_analysis import EXACT, sideways
 from tests.builders import block, held, lacking
 
 ROUGH = Mortar(friction=5.0)

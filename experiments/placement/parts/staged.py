@@ -20,10 +20,15 @@ import pandas as pd
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines._grip_compliance import GripCompliance, read_compliance
-from seqopt.engines.interface import Fields, grip_columns
-from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
-from seqopt.engines.rigid._mixed import edge_forces, reactions, solve_load, split_pairs
+from seqopt.engines.interface import Fields, GripCompliance, grip_columns, read_compliance
+from seqopt.engines.rigid._mixed import (
+    Ungripped,
+    edge_forces,
+    reactions,
+    solve_load,
+    split_pairs,
+    ungripped_system,
+)
 from seqopt.errors import StepError
 from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.build import network_of

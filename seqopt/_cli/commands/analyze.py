@@ -17,10 +17,9 @@ from seqopt.engines.registry import provenance
 from seqopt.errors import MechanismError, SeqoptError, SolverError
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.questions import analyze
-from seqopt.responses._enough import what_was_enough
 from seqopt.responses._faults import _with_faults, analyze_each
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.responses.table import LinearRange
+from seqopt.responses.table import LinearRange, what_was_enough
 from seqopt.sequence.steps import _idle_note
 from seqopt.work.progress import Tell, with_progress
 

@@ -17,10 +17,9 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact._elastic_limits import face_quadrature, opening_maps
-from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
-from seqopt.contact.mortar import BedStiffness, Mortar
+from seqopt.contact.mortar import BedStiffness, Mortar, face_quadrature, opening_maps
+from seqopt.contact.mortar import quadrature_stiffness as bed_stiffness
 from seqopt.engines.interface import FAR
 from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network

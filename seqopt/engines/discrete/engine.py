@@ -20,11 +20,9 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, BedStiffness, Mortar
-from seqopt.engines._grip_compliance import GripCompliance, grip_springs
 from seqopt.engines.discrete._system import Held, Settled, System, build_system, settle
-from seqopt.engines.interface import Fields, OpeningEngine
-from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
-from seqopt.engines.rigid._mixed import Solution, respond
+from seqopt.engines.interface import Fields, GripCompliance, OpeningEngine, grip_springs
+from seqopt.engines.rigid._mixed import Solution, mechanism_error, require_resistance, respond
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network

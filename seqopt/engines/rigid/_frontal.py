@@ -29,16 +29,17 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import GripCompliance
-from seqopt.engines.interface import Fields, _join_sets, no_sets
-from seqopt.engines.rigid._mechanism import Ungripped, share, ungripped_system
+from seqopt.engines.interface import Fields, GripCompliance, _join_sets, no_sets
 from seqopt.engines.rigid._mixed import (
     Solution,
+    Ungripped,
     are_small,
     borne,
     held_rows,
     respond,
+    share,
     sizes,
+    ungripped_system,
     unscaled,
 )
 from seqopt.engines.rigid._operator import ResponseMaps, scene_maps

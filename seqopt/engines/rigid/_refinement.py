@@ -29,33 +29,33 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import RIGID, GripCompliance
-from seqopt.engines.interface import Fields, _join_sets, _merge_sets, no_sets
-from seqopt.engines.rigid._grip_equations import (
-    as_rows,
-    grip_forces,
-    nearly_rigid,
-    pairs_of,
-    undone,
-)
-from seqopt.engines.rigid._mechanism import (
+from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, _merge_sets, no_sets
+from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
     Shared,
-    Ungripped,
-    require_resistance,
-    ungripped_system,
-)
-from seqopt.engines.rigid._mixed import (
     Solution,
+    Ungripped,
     bordered,
     borne,
+    require_resistance,
     rescaled,
     respond,
     solve_mixed,
     unchanged,
+    ungripped_system,
     unscaled,
 )
-from seqopt.engines.rigid._operator import ComplianceOperator, ResponseMaps, load_rows, scene_maps
+from seqopt.engines.rigid._operator import (
+    ComplianceOperator,
+    ResponseMaps,
+    as_rows,
+    grip_forces,
+    load_rows,
+    nearly_rigid,
+    pairs_of,
+    scene_maps,
+    undone,
+)
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network

@@ -13,43 +13,48 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.util import find_spec
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._grip_compliance import RIGID, GripCompliance, read_compliance
 from seqopt.engines.interface import (
+    RIGID,
     SHAPES,
     Fields,
+    GripCompliance,
     NamedEngine,
     Want,
     _failing_in_a_line,
     grip_columns,
     keep_wanted,
     names_wanted,
+    read_compliance,
     require_finite,
 )
-from seqopt.engines.rigid._extremes import Extremes, GrownExtremes, can_compile, extremes_in
-from seqopt.engines.rigid._grip_equations import (
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mixed import LAST_CORRECTION, Shared, share
+from seqopt.engines.rigid._operator import (
+    ComplianceOperator,
+    OperatorBuilder,
+    are_few,
     grip_forces,
     nearly_rigid,
     pairs_of,
     share_pairs,
     well_conditioned,
 )
-from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import LAST_CORRECTION, Shared, share
-from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
 
 if TYPE_CHECKING:
+    from seqopt.engines.rigid._extremes import GrownExtremes
     from seqopt.engines.rigid._frontal import FrontalSystem
     from seqopt.engines.rigid._refinement import Refinement
 
@@ -133,6 +138,47 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
+class Extremes(NamedTuple):
+    """Extremes of the fields of S grip sets.
+
+    ``least``, ``most`` (S,): force of any edge, N; ``shift`` (S,): displacement of any node, m;
+    ``moment`` (S,): at any ground end, N m; ``force`` (S, r): of every grip, N. What was not asked
+    for means nothing.
+    """
+
+    least: Floats
+    most: Floats
+    shift: Floats
+    moment: Floats
+    force: Floats
+
+
+def extremes_in(fields: Fields, want: Want) -> Extremes:
+    """Return the extremes of fields that are there."""
+    sets = len(fields.grip_force)
+    found = np.zeros((4, sets))
+    if want & Want.EDGES:
+        found[:2] = fields.edge_force.min(axis=1), fields.edge_force.max(axis=1)
+    if want & Want.DISPLACEMENTS:
+        found[2] = _squared(fields.displacement).max(axis=1)
+    if want & Want.SUPPORT:
+        found[3] = _squared(fields.support[..., 3:]).max(axis=1)
+    np.sqrt(found[2:], out=found[2:])
+    size = np.sqrt(_squared(fields.grip_force))
+    return Extremes(found[0], found[1], found[2], found[3], size)
+
+
+def _squared(vectors: Floats) -> Floats:
+    """Return the squares of lengths (S, n) of vectors (S, n, 3), of which NumPy takes thrice."""
+    return np.asarray(np.einsum("snk,snk->sn", vectors, vectors))
+
+
+@cache
+def can_compile() -> bool:
+    """Return whether loops can be compiled: numba is there."""
+    return find_spec("numba") is not None
+
+
 _LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on blocks are sooner
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
@@ -214,6 +260,8 @@ class ComplianceEngine(NamedEngine):
         moves = large and (self.network.springs.movement.any() or self._builder.moments)
         if large and not moves and self._builder.growth.bricks <= bricks:
             if self._grown is None:
+                from seqopt.engines.rigid._extremes import GrownExtremes  # noqa: PLC0415  # numba
+
                 self._grown = GrownExtremes(self._builder)
             self._grown.reach(bricks)
             found, size, apart = self._grown.solve(columns, want, self._accepted(want) / _UNSEEN)

@@ -44,9 +44,8 @@ from seqopt.problem.problem import (
 from seqopt.problem.requirements import Criterion, Limit, state_costs
 from seqopt.problem.resources import Resource
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses._grip_sets import BAND, GripSets, _near
+from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
-from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
