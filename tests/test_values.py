@@ -15,8 +15,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import face_quadrature, find_elastic_limits
 from seqopt.engines.diagnosis import diagnose
-from seqopt.engines.discrete._system import build_system, settle
-from seqopt.engines.discrete.engine import _held_nodes
+from seqopt.engines.discrete.engine import _build_system, _held_nodes, _settle
 from seqopt.engines.interface import RIGID, Want, read_compliance
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system
@@ -27,9 +26,8 @@ from seqopt.network._mechanics import build_statics
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces
 from seqopt.scene.shape import Surface
-from seqopt.stability._load_factor import load_factor
 from seqopt.stability._steps import each_verdict
-from seqopt.stability.assessment import assess, bonded
+from seqopt.stability.assessment import assess, bonded, load_factor
 from seqopt.stability.limit_analysis import Prover
 from tests.blocks import box
 
@@ -43,7 +41,7 @@ def values(arch25):
     tree = grow_tree(network)
     grips = np.array([2])
     assembly = step_assembly(network, 2, (2, None, None))
-    system = build_system(network, 2, seqopt.EPOXY, None)
+    system = _build_system(network, 2, seqopt.EPOXY, None)
     held = _held_nodes(network, system, grips, RIGID, [])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, seqopt.EPOXY))
@@ -59,7 +57,7 @@ def values(arch25):
         *(tree, operator, operator.doubts, parts, share(network)),
         mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points),
-        *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
+        *(_settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, seqopt.EPOXY)),
         *(load_factor(assembly, seqopt.EPOXY), arch25.grip_kinds),
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),

@@ -20,7 +20,7 @@ from seqopt.problem.requirements import (
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
-from seqopt.stability._builds import BuildProver, BuildVerdicts, _settlement_said
+from seqopt.stability.failure_map import BuildProver, BuildVerdicts, _settlement_said
 
 
 def size_line(scene: Scene) -> str:

@@ -235,7 +235,7 @@ _CUTS = 2  # times that each triangle of a face is cut into four
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Quadrature(FrozenValue):
+class _Quadrature(FrozenValue):
     """Points that stand for faces; a face is a contact of an assembly."""
 
     point: Floats  # (P, 3); m
@@ -243,7 +243,7 @@ class Quadrature(FrozenValue):
     area: Floats  # (P,); share of its face that a point stands for, m²
 
 
-def face_quadrature(assembly: Assembly) -> Quadrature:
+def face_quadrature(assembly: Assembly) -> _Quadrature:
     """Return the bed of all contacts, in their order.
 
     The middles of edges of triangles, each cut into four twice, integrate squares exactly.
@@ -259,7 +259,7 @@ def face_quadrature(assembly: Assembly) -> Quadrature:
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(sides, axis=1) / 6  # a third of the triangle
     middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
-    return Quadrature(middles.reshape(-1, 3), np.repeat(face, 3), np.repeat(area, 3))
+    return _Quadrature(middles.reshape(-1, 3), np.repeat(face, 3), np.repeat(area, 3))
 
 
 def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
@@ -270,7 +270,7 @@ def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats)
     return np.asarray(assembly.axes[face] @ point_motion(points - center[face]))
 
 
-def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
+def quadrature_stiffness(bed: _Quadrature, maps: Floats, moduli: Floats) -> Floats:
     """Return the stiffness (C, 6, 6) of the beds of faces at their centers, N/m and N m/rad.
 
     ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C, 2): normal and tangential, N/m³.

@@ -134,7 +134,7 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
 _RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
 
 
-class GripSpring(NamedTuple):
+class _GripSpring(NamedTuple):
     """A compliant grip as a spring between its node and its far end.
 
     ``ways`` (w,): in which of three shifts and three turns; ``compliance`` (w, w): m and rad for N
@@ -147,7 +147,7 @@ class GripSpring(NamedTuple):
     offset: Floats
 
 
-def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
+def grip_springs(compliance: GripCompliance, grips: int) -> list[_GripSpring]:
     """Return the compliant ones of the grips of one set, in space."""
     if compliance.matrix is None:
         return []
@@ -164,7 +164,7 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[GripSpring]:
         if values[0] < least and not (even and values[0] > 0):  # too few joints give any
             own = np.asarray(axes * np.maximum(values, least) @ axes.T)
         offsets = np.pad(offset[grip], (0, 3))[ways]
-        out.append(GripSpring(grip, ways, own / np.outer(scale, scale), offsets))
+        out.append(_GripSpring(grip, ways, own / np.outer(scale, scale), offsets))
     return out
 
 

@@ -34,8 +34,8 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
 
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}

@@ -21,7 +21,7 @@ from seqopt.report.comparison import compare as compare_builds
 from seqopt.scene._armed import find_postures
 from seqopt.scene.scene import Scene
 from seqopt.sequence.part import find_scene
-from seqopt.stability._builds import BuildProver, find_prover
+from seqopt.stability.failure_map import BuildProver, find_prover
 from seqopt.study.published import find_criterion
 from seqopt.work.progress import Tell
 from seqopt.workflow import DEFAULTS

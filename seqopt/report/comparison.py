@@ -42,8 +42,8 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import Step, _idle_note
-from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import BuildProver, BuildVerdicts
 from seqopt.study.published import PUBLISHED, published_about, published_plan
 from seqopt.work.progress import Stage, Tell
 

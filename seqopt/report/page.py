@@ -44,7 +44,7 @@ from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._builds import WORDS, BuildVerdicts
+from seqopt.stability.failure_map import WORDS, BuildVerdicts
 
 LARGEST = 32767
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step

@@ -14,8 +14,8 @@ from seqopt.problem.requirements import _prop_faults, _response_along, overloads
 from seqopt.responses.quantities import _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
-from seqopt.stability._builds import BuildVerdicts, _settlement_said
 from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import BuildVerdicts, _settlement_said
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
 

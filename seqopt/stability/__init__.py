@@ -16,15 +16,9 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 `load_factors` finds the largest multiple of the scene's loads that every step bears.
 """
 
-from typing import TYPE_CHECKING
-
-from seqopt._later import later
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability._steps import assess_steps, stability_table
-from seqopt.stability.assessment import Stability, Verdict, assess
-
-if TYPE_CHECKING:
-    from seqopt.stability._load_factor import LoadFactor, load_factors
+from seqopt.stability.assessment import LoadFactor, Stability, Verdict, assess, load_factors
 
 __all__ = [
     "LoadFactor",
@@ -37,6 +31,3 @@ __all__ = [
     "load_factors",
     "stability_table",
 ]
-__getattr__, __dir__ = later(
-    __name__, dict.fromkeys(("LoadFactor", "load_factors"), "_load_factor")
-)

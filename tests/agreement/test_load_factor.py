@@ -17,10 +17,9 @@ from seqopt.scene import Load
 from seqopt.scene.library import WallShape, wall
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability import Margins, Screen, Verdict, load_factors
-from seqopt.stability._builds import BuildProver
-from seqopt.stability._load_factor import load_factor
 from seqopt.stability._steps import each_verdict
-from seqopt.stability.assessment import bonded
+from seqopt.stability.assessment import bonded, load_factor
+from seqopt.stability.failure_map import BuildProver
 from seqopt.stability.limit_analysis import CAP, EXACT, Sense, bound, compile_equilibrium, violation
 from tests.builders import block
 

@@ -16,7 +16,7 @@ from seqopt.engines.registry import ENGINES
 from seqopt.engines.rigid import _growth
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine, can_compile, extremes_in
+from seqopt.engines.rigid.compliance import ComplianceEngine, _can_compile, _extremes_in
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
 from seqopt.responses._grip_sets import Block, answer
@@ -27,7 +27,7 @@ from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arc
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened
 
-needs_numba = pytest.mark.skipif(not can_compile(), reason="no numba")
+needs_numba = pytest.mark.skipif(not _can_compile(), reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 CLOSE = 1e-12  # of what is largest
@@ -48,7 +48,7 @@ def gap_of(found, true):
 
 
 def of_fields(engine, bricks, sets, want):
-    return extremes_in(engine.solve(bricks, sets, want), want)
+    return _extremes_in(engine.solve(bricks, sets, want), want)
 
 
 @needs_numba
@@ -160,7 +160,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
 
 
 def test_without_numba_fields_answer(monkeypatch):
-    monkeypatch.setattr("seqopt.engines.rigid.compliance.can_compile", lambda: False)
+    monkeypatch.setattr("seqopt.engines.rigid.compliance._can_compile", lambda: False)
     monkeypatch.setitem(sys.modules, "seqopt.engines.rigid._extremes", None)  # not imported
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = sets_of(engine.network, 6, 2, 10)

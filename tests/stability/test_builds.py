@@ -11,10 +11,10 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.scene.scene_file import dump_scene
-from seqopt.stability import _builds, _steps
-from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
+from seqopt.stability import _steps, failure_map
 from seqopt.stability._steps import VerdictChain, each_verdict
 from seqopt.stability.assessment import Verdict, verdict
+from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 
@@ -50,13 +50,13 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
 @pytest.mark.parametrize(("names", "left"), [(("dry", "epoxy"), True)])
 def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeypatch, names, left):
     """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
-    asked, real = {}, _builds.each_verdict
+    asked, real = {}, failure_map.each_verdict
 
     def noted(parts, steps, mortar):
         asked.setdefault(mortar, {(step.bricks, step.grips) for step in steps})
         return real(parts, steps, mortar)
 
-    monkeypatch.setattr(_builds, "each_verdict", noted)
+    monkeypatch.setattr(failure_map, "each_verdict", noted)
     prover, steps = BuildProver(flat, {name: SHOWN[name] for name in names}), builds["cantilever"]
     (said, _) = prover.of_builds({"a": steps})["a"]
     pairs = zip(steps, said.verdicts, strict=True)

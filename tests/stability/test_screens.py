@@ -19,9 +19,8 @@ from seqopt.contact.mortar import DRY
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability._load_factor import load_factors
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, held_places
-from seqopt.stability.assessment import Verdict, assess, bonded
+from seqopt.stability.assessment import Verdict, assess, bonded, load_factors
 from seqopt.stability.limit_analysis import (
     _MORE,
     DIRECTIONS,

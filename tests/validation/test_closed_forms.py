@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import DRY, BedStiffness, Mortar
-from seqopt.engines.discrete._system import build_system, settle
-from seqopt.engines.discrete.engine import DiscreteEngine, _held_nodes
+from seqopt.engines.discrete.engine import DiscreteEngine, _build_system, _held_nodes, _settle
 from seqopt.engines.interface import RIGID, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
@@ -183,8 +182,8 @@ def test_an_open_base_tilts_as_statics_says():
     """A resultant at e from the middle presses on c = 3 (b/2 - e) of a base without tension."""
     size, lean, stiffness = (0.4, 0.3, 0.5), math.radians(25), 1e9
     net = build_network(block(size, lean))
-    system = build_system(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
-    found = settle(_held_nodes(net, system, np.zeros(0, int), RIGID, []))
+    system = _build_system(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
+    found = _settle(_held_nodes(net, system, np.zeros(0, int), RIGID, []))
     assert found.rests
     eccentric = size[2] / 2 * math.tan(lean)
     assert eccentric > size[0] / 6  # else all of it would press

@@ -23,7 +23,7 @@ from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
-from seqopt.stability._builds import BuildProver, BuildVerdicts, find_prover
+from seqopt.stability.failure_map import BuildProver, BuildVerdicts, find_prover
 from seqopt.study.published import paper_models
 from seqopt.work.progress import Tell
 from seqopt.workflow import Robust, optimize

@@ -25,7 +25,7 @@ from seqopt.report.comparison import shown_table
 from seqopt.responses.table import Departure, LinearRange, analyze, builds_in_words
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
-from seqopt.stability._builds import BuildVerdicts, find_prover
+from seqopt.stability.failure_map import BuildVerdicts, find_prover
 from seqopt.work.progress import INTERRUPT, Tell
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"

@@ -153,7 +153,7 @@ class Extremes(NamedTuple):
     force: Floats
 
 
-def extremes_in(fields: Fields, want: Want) -> Extremes:
+def _extremes_in(fields: Fields, want: Want) -> Extremes:
     """Return the extremes of fields that are there."""
     sets = len(fields.grip_force)
     found = np.zeros((4, sets))
@@ -174,7 +174,7 @@ def _squared(vectors: Floats) -> Floats:
 
 
 @cache
-def can_compile() -> bool:
+def _can_compile() -> bool:
     """Return whether loops can be compiled: numba is there."""
     return find_spec("numba") is not None
 
@@ -250,9 +250,9 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self.network, columns, numbers, None)
-        if not compiled or not compliance.rigid or not can_compile():
+        if not compiled or not compliance.rigid or not _can_compile():
             fields = self._found(bricks, columns, compliance, want)
-            return extremes_in(require_finite(fields, bricks, numbers), want)
+            return _extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         large = bricks <= min(self._uniform, len(self._tree.spring))
@@ -267,7 +267,7 @@ class ComplianceEngine(NamedEngine):
             found, size, apart = self._grown.solve(columns, want, self._accepted(want) / _UNSEEN)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
-            rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
+            rest = _extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
 
