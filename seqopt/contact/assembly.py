@@ -194,10 +194,7 @@ class Assembly(FrozenValue):
         return spread(block[real], real, values, (len(self.centroid), len(block)))
 
     def load(self, direction: Vector | None = None) -> Floats:
-        """Return weights, or as much along a direction, as wrenches (6B,) over the force scale.
-
-        What is applied beside them is not in it.
-        """
+        """Return weights, or as much along a direction, as wrenches (6B,) over the force scale."""
         pull = self.weight
         if direction is not None:
             pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)

@@ -175,9 +175,8 @@ def _polygon_area(polygon: Floats) -> float:
 class _PropGrips(NamedTuple):
     """The grips of props on a partial structure.
 
-    What holds both ways is a grip like that of a robot. One that only pushes bears from nothing to
-    its capacity along its line, and nothing across it: half the capacity is applied for good, and a
-    grip along the line adds as much or takes it away.
+    One that only pushes bears from nothing to its capacity along its line: half the capacity is
+    applied for good, and a grip along the line adds as much or takes it away.
     """
 
     nodes: tuple[int, ...]
@@ -243,10 +242,9 @@ _KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
 class PartialAssemblies:
     """Cuts the assemblies of steps, as of `step_assembly`, from one whole.
 
-    The parts of a partial structure come first in a network, and so do its contacts and corners in
-    the assembly of the whole. Only what is largest or heaviest in it, and all lengths over a lever,
-    differ: maps by rounding, and all else in no bit. Raises a `SceneError` if bricks that share a
-    joint do not touch, even in a step that is not asked for.
+    What stands comes first in a network, as in the whole. Only what is largest or heaviest, and
+    lengths over a lever, differ: maps by rounding, all else in no bit. Raises a `SceneError` if
+    bricks that share a joint do not touch, even in a step that is not asked for.
     """
 
     def __init__(self, network: Network, bricks: int) -> None:

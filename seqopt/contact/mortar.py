@@ -91,10 +91,7 @@ def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
 
 
 def find_mortar(mortar: Mortar | str, where: str = "mortar") -> Mortar:
-    """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa.
-
-    ``where``: what is given, for messages.
-    """
+    """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa."""
     if isinstance(mortar, Mortar):
         return mortar
     if str(mortar) in MORTARS:
@@ -137,12 +134,9 @@ Points = tuple[tuple[float, float], ...]
 class Curing(Terse):
     """The share of its full bond that a joint has at an age: what was reached last, never more.
 
-    Its age counts from when the brick that closes it is in its place. Tensile strength and
-    cohesion grow with the share; friction is there from the first.
-
-    ``points``: ages, s, and the share that is reached then, both rising; the last share is 1.
-    Before the first point there is no bond. No points at all: it never cures. Raises `SceneError`
-    if ages or shares do not rise, or the last share is not 1.
+    Its age counts from when the brick that closes it is in its place; friction is there from the
+    first. ``points``: ages, s, and shares, both rising to 1; none: it never cures. Raises
+    `SceneError` if they do not rise, or the last share is not 1.
     """
 
     points: Points = ()
@@ -186,9 +180,8 @@ def _linear(seconds: float) -> Points:
 def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
     """Return how mortar cures: itself, or by words.
 
-    ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, counted
-    from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``. An age without a
-    unit is in s.
+    ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, at
+    `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``. No unit: s.
     """
     if isinstance(given, Curing):
         return given
@@ -218,10 +211,7 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
 
 @dataclass(frozen=True)
 class BedStiffness:
-    """Stiffness of a joint or pad per area.
-
-    ``normal``, ``tangential``: N/m³. Raises `SceneError` if one is not a positive number.
-    """
+    """Stiffness of a joint or pad per area, N/m³: positive numbers, or a `SceneError`."""
 
     normal: float
     tangential: float

@@ -51,9 +51,8 @@ def _spectrum(
 ) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
-    The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
-    matrix has lost to rounding; a mechanism is shifted. Results: smallest eigenvalue, condition and
-    mode, as in `seqopt.engines.diagnosis.Diagnosis`.
+    The mixed system applies the inverse: it keeps small eigenvalues that the stiffness matrix has
+    lost to rounding; a mechanism is shifted. Results: eigenvalue, condition, mode of `Diagnosis`.
     """
     parts = ungripped_system(network, bricks)
     root = np.sqrt(parts.stiffness)[:, None]
@@ -101,11 +100,10 @@ def _lowest(system: MixedSystem, scale: Floats, before: int) -> tuple[float, Flo
 class _Residuals:
     """What is left of the equations when fields are put in, without unit.
 
-    ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
-    ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
-    in it, or over the weight of a brick where they are smaller; ``grips``: what is between a held
-    node and its grip over the largest motion of any brick, or over what the weight of a brick does
-    to the stiffest joint where all are smaller.
+    ``equilibrium``: force or moment on a brick over the largest sum of magnitudes on one;
+    ``joints``: wrench less stiffness times deformation, over the magnitudes in it or at least a
+    brick's weight; ``grips``: between a held node and its grip, over the largest motion of any
+    brick, or at least what a brick's weight does to the stiffest joint.
     """
 
     equilibrium: float

@@ -79,10 +79,9 @@ RIGID = GripCompliance()
 def read_compliance(
     network: Network, columns: Ints, grips: ArrayLike, moved: ArrayLike | None
 ) -> GripCompliance:
-    """Return the compliance of grip sets (S, r), as `grip_columns` gives them.
+    """Return the compliance of grip sets (S, r), from columns and what `Engine.solve` takes.
 
-    ``grips``, ``moved``: as `seqopt.engines.interface.Engine.solve` takes them. Raises `GripError`
-    if ``moved`` is not as many lengths.
+    Raises `GripError` if ``moved`` is not as many lengths.
     """
     found = _in_place(network, np.asarray(grips))
     if moved is None:
@@ -445,10 +444,7 @@ class NamedEngine:
 
 
 class SerialEngine(NamedEngine, ABC):
-    """Base of engines that solve grip sets one after the other, each from scratch.
-
-    All fields are evaluated for every request: the solution dominates the cost.
-    """
+    """Base of engines that solve grip sets one by one, each from scratch, with all fields."""
 
     @_failing_in_a_line()
     def solve(

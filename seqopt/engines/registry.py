@@ -137,10 +137,9 @@ def recipe_of(engine: object) -> Recipe | None:
 
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:
-    """Return an engine of the same kind and settings for another scene.
+    """Return an engine of the same kind and settings for another scene; arms keep their postures.
 
-    Arms hold in it in the postures of the engine's own scene. Raises `ProblemError` if the engine
-    was not made by name.
+    Raises `ProblemError` if the engine was not made by name.
     """
     recipe = recipe_of(engine)
     if recipe is None:
@@ -243,8 +242,7 @@ def engine_mortar(
 def simplest(engine: Engine) -> Engine:
     """Return the engine that answers all grip sets of a problem: of `auto` the level of its scene.
 
-    Exactly rigid bricks; whether that was enough is to be asked of the steps that are chosen. Any
-    other engine is returned as it is.
+    Whether rigid bricks were enough is to be asked of the steps that are chosen.
     """
     if not isinstance(engine, AutoEngine):
         return engine
@@ -263,11 +261,10 @@ def _chooser_of(engine: Engine) -> AutoEngine | None:
 
 
 def provenance(engine: Engine) -> dict[str, object]:
-    """Return the entries of a summary about the engine, after it computed, and packages.
+    """Return the entries of a summary about packages and the engine, after it computed.
 
-    ``engine``: its ``name``, the ``reason`` for it, the ``mortar`` if one was given, and of an
-    automatic one the ``level`` that it took for all grip sets, or the ``levels`` for how many
-    ``sets``, and why each.
+    Of an automatic one with the ``level`` that it took for all grip sets, or the ``levels`` for how
+    many ``sets``, and why each.
     """
     recipe = recipe_of(engine)
     said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}

@@ -24,10 +24,7 @@ from seqopt.stability.assessment import Verdict
 def analyze_each(
     within: LinearRange, steps: Iterable[Step], faults: dict[int, SeqoptError]
 ) -> pd.DataFrame:
-    """Return the responses of the steps that an engine solves; errors of others go to ``faults``.
-
-    These are by step number: a step that falls is a mechanism, also where a solver fails.
-    """
+    """Return responses of steps that an engine solves; others' errors by number in ``faults``."""
     return response_table(within.engine.network, _solved(within, steps, faults))
 
 
@@ -68,11 +65,10 @@ def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
 def _with_faults(
     scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
 ) -> pd.DataFrame:
-    """Return a table with added rows of steps that were not solved, and a column of reasons.
+    """Return a table of `analyze` with rows of steps that were not solved, and a reason for each.
 
-    ``table``: of the others; ``faults``: errors by step number. The column ``finding`` is
-    ``mechanism``, with the brick that moves most, or ``not solved``, which leaves the step
-    undecided; the cells of their responses are empty.
+    The column ``finding`` is ``mechanism``, with the brick that moves most, or ``not solved``,
+    which leaves the step undecided; the cells of their responses are empty.
     """
     rows: dict[int, dict[str, object]] = {}
     for row in table.assign(finding="").to_dict("records"):

@@ -144,10 +144,7 @@ def answer(engine: Engine, block: Block) -> Answers:
 
 
 def packed(engine: Engine) -> bytes:
-    """Pickle the recipe of an engine, or the engine itself if it has none.
-
-    Raises `SceneError` if a user's engine cannot be pickled.
-    """
+    """Pickle an engine's recipe, or itself if it has none; a `SceneError` if it cannot be."""
     recipe = recipe_of(engine)
     known = recipe is not None and recipe.network == engine.network  # else it makes another engine
     try:
@@ -206,11 +203,10 @@ class KnownRows:
         return np.where(known[at] == codes, values[at, 0], np.nan)
 
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
-        """Return the rows of codes; those not cached are computed as one batch.
+        """Return the rows (n, k) of codes (n,); those not cached are computed as one batch.
 
-        ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
-        k) of distinct codes, given the places (m,) of their first occurrence in the request.
-        Result (n, k).
+        ``key``: codes of other keys are others; ``compute``: returns the rows of distinct codes,
+        given the places of their first occurrence in the request.
         """
         distinct, first = np.unique(codes, return_index=True)
         known, values = self._known.get(key, (distinct[:0], None))
@@ -275,13 +271,11 @@ class GripSets:
         return self._known.nbytes
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
-        """Return the responses of grip sets and the forces of their grips.
+        """Return responses (S, R), in the order of the names, and forces (S, r) of grips, SI units.
 
         ``held`` (S, r): nodes held, ascending in every row, as places in build order counted from
-        1, those of grips of the second kind after all of the first, and so on; zeros for robots
-        that hold none. Results: ``responses`` (S, R): in the order of the
-        names, SI units; infinite where something would be loose. ``forces`` (S, r): N; zero for a
-        robot that holds none.
+        1, those of grips of the second kind after all of the first, and so on; zero for a robot
+        that holds none, whose force is zero. Infinite where something would be loose.
         """
         held = np.asarray(held)
         responses, forces = np.zeros((len(held), len(self.names))), np.zeros(held.shape)
@@ -294,10 +288,7 @@ class GripSets:
         return responses, forces
 
     def of_grips(self, bricks: int, grips: Ints) -> tuple[Floats, Floats]:
-        """Return responses (S, R) and forces (S, r) of grips, by number, in any order.
-
-        ``grips`` (S, r): as `seqopt.Scene.grip_numbers` has them.
-        """
+        """Return responses (S, R) and forces (S, r) of grips (S, r), by number, in any order."""
         order, forces = np.argsort(grips, axis=1), np.zeros(grips.shape)
         found = self._found(bricks, np.take_along_axis(grips, order, axis=1))
         np.put_along_axis(forces, order, found[:, len(self.names) :], axis=1)
@@ -323,10 +314,9 @@ class GripSets:
 def solve_sets(
     engine: Engine, sets: Block, resources: Resources = HERE, *, loose: bool = True
 ) -> Floats:
-    """Return responses and grip forces of grip sets; infinite for mechanisms.
+    """Return responses and grip forces (S, R + r) of grip sets of one brick count, SI units.
 
-    ``sets``: of one brick count; ``resources``: workers; ``loose``: as of `GripSets`. Result (S, R
-    + r): SI units. Raises `SolverError`, `WorkerError`.
+    ``loose``: as of `GripSets`. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task

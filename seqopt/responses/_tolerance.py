@@ -61,17 +61,10 @@ def values_text(values: Mapping[str, float]) -> str:
 class Tolerance:
     """The tolerance of the grips of a step, and the payload that is reached first.
 
-    Attributes
-    ----------
-    distance : float
-        m; zero where something is too large with all grips in their places, infinite where grips
-        change nothing.
-    proven : float
-        Up to which nothing is too large, m: at most a ten-thousandth below it, mostly a millionth.
-    what : str
-        What becomes too large first; empty if nothing does.
-    misplacement : tuple of (float, float, float)
-        Of every grip, in the order of the robots, the worst that is as far, m.
+    ``distance``: m; zero where something is too large with all grips in their places, infinite
+    where grips change nothing; ``proven``: up to which nothing is too large, m, mostly a millionth
+    below it; ``what``: becomes too large first; empty if nothing does; ``misplacement``: the worst
+    of every grip that is as far, m.
     """
 
     distance: float
@@ -131,12 +124,10 @@ def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
 
 
 def misfits(engine: Engine, bricks: int, grips: Ints) -> Floats:
-    """Return the reciprocals (S,) of the tolerances of grip sets, 1/m.
+    """Return the reciprocals (S,) of the tolerances of grip sets (S, r), by number, 1/m.
 
     `NO_TOLERANCE` if a payload is exceeded without misplacement, and if two rigid grips hold one
     brick, which any misplacement makes incompatible.
-
-    ``grips`` (S, r): numbers, as of `seqopt.Scene.grip_numbers`.
     """
     held = grips.shape[1]
     if not bricks:  # the empty site: nobody holds
@@ -190,8 +181,7 @@ def misfits_along(tolerances: ArrayLike) -> Floats:
 def worst_rates(forces: Misplaced) -> tuple[Floats, Floats]:
     """Return by how much of its payload a misplacement of one meter may change each force.
 
-    Results: ``rate`` (n,), 1/m, infinite where they are too large already; ``direction`` (n, 3):
-    unit vectors along which they become so first.
+    Results: ``rate`` (n,), 1/m, infinite where they are too large already; ``direction`` (n, 3).
     """
     rate, direction = np.full(len(forces.own), np.inf), np.zeros_like(forces.own)
     direction[:, 0] = 1.0
@@ -203,10 +193,7 @@ def worst_rates(forces: Misplaced) -> tuple[Floats, Floats]:
 
 
 def proven_rates(forces: Misplaced, direction: Floats) -> tuple[Floats, Floats]:
-    """Return proven lower and upper bounds of the rates of forces, (n,) each, 1/m.
-
-    ``direction`` (n, 3): estimates of the worst ones.
-    """
+    """Return proven bounds of the rates (n,), 1/m, from estimates of directions (n, 3)."""
     low, high = np.full((2, len(forces.own)), np.inf)
     for i in np.flatnonzero(np.linalg.norm(forces.own, axis=1) < forces.most):
         low[i], high[i], _ = _bracket(forces.some(slice(i, i + 1)), direction[i : i + 1])
@@ -220,10 +207,7 @@ def worst_misplacement(forces: Misplaced, direction: Floats) -> Floats:
 
 
 def _search(forces: Misplaced) -> tuple[Floats, Floats]:
-    """Return rates (n,) and directions (n, 3): from one start where it is proven optimal.
-
-    Elsewhere from several, and if no bound is tight, by spherical triangles.
-    """
+    """Return rates (n,) and directions (n, 3): from one start if proven optimal, else several."""
     sphere = np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
     every = np.broadcast_to(sphere, (len(forces.own), *sphere.shape))
     starts = sphere[np.argsort(-forces.rates(every), axis=1, kind="stable")[:, :_BEST]]

@@ -267,10 +267,7 @@ EXCESS_COLUMN = "prop_excess_N"
 
 
 def _excess_of(props: Sequence[Prop], force: Floats) -> Floats:
-    """Return the largest violation (S,) of capacities by forces (S, p, 3) of props, N.
-
-    Force above the capacity, or tension in a prop that only pushes; zero if there is none.
-    """
+    """Return by how much forces (S, p, 3) of props exceed what they bear at most, (S,), N."""
     out = np.zeros(len(force))
     for prop, own in zip(props, force.transpose(1, 0, 2), strict=True):
         if prop.capacity is not None:

@@ -83,9 +83,8 @@ class Departure:
 class LinearRange:
     """Checks the steps of builds against the linear range of an engine.
 
-    ``engine``: its engine; ``mortar``: with the elastic limits of joints; ``unchecked``: one line
-    that says why stresses in joints are not checked, or empty; ``far``: the limit of displacements,
-    m; ``offs``: cached tolerances of grips, m.
+    ``mortar``: with the elastic limits of joints; ``unchecked``: why stresses in joints are not
+    checked, or empty; ``far``: the limit of displacements, m; ``offs``: cached tolerances, m.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -158,10 +157,7 @@ class LinearRange:
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def closest(self, table: _Columns) -> tuple[float, str, int]:
-        """Return the joint closest to its elastic limits: margin, Pa, name and step.
-
-        The margin is negative beyond them; NaN, without a joint, if it is not known.
-        """
+        """Return margin, Pa, name and step of the joint closest to its limits; NaN if unknown."""
         excess, joint = self._measured(table)[:, 2:].T
         at = int(excess.argmax())
         if self._limits is None or not np.isfinite(excess[at]):
@@ -327,10 +323,7 @@ def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fiel
 def _each_fields(
     engine: Engine, steps: Iterable[Step], want: Want = Want.RESPONSES
 ) -> Iterator[Fields]:
-    """Yield the full fields of every step, as `step_fields`.
-
-    Consecutive steps with equal bricks are solved as one batch, equal states once.
-    """
+    """Yield the full fields of every step; those with equal bricks in a row as one batch."""
     scene = engine.network.scene
     for bricks, same in groupby(steps, attrgetter("bricks")):
         near = [*same]
@@ -458,10 +451,9 @@ _KNOWN = AutoEngine, ComplianceEngine, OpeningEngine
 class Enough(Terse):
     """The model of the steps of builds, and the estimated effect of other models.
 
-    ``engine``: its name; ``others``: what more detailed ones would change here, in words;
-    ``joint``, ``step``: which joint comes closest to its elastic limits, and where; empty where
-    that is not known; ``below_limit``: its margin to these, Pa; negative beyond them;
-    ``left_out``: of the model.
+    ``others``: what more detailed ones would change here, in words; ``joint``, ``step``: which
+    comes closest to its elastic limits, and where; empty if not known; ``below_limit``: its margin
+    to these, Pa, negative beyond them; ``left_out``: of the model.
     """
 
     engine: str
@@ -540,9 +532,8 @@ def _left_out(within: LinearRange, builds: Mapping[str, _Columns]) -> Iterator[s
 def each_tolerance(
     engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
 ) -> Floats:
-    """Return the tolerance of grips of every step, m.
+    """Return the tolerance of grips of every step, m; those alike are solved as one batch.
 
-    Steps of equal numbers of bricks and grips are solved as one batch, equal states once.
     ``known``: cache by bricks and grips, updated in place.
     """
     known = {} if known is None else known

@@ -255,10 +255,7 @@ class _Search:
         )
 
     def _directions(self, point: _Point, inverse: Floats) -> Callable[[Floats], _Point]:
-        """Return the direction in which to go from a point, by the aim of the scaled cones.
-
-        ``inverse`` (4, 4, C): of the scaling.
-        """
+        """Return the direction in which to go from a point, by the aim of the scaled cones."""
         balance, cones, square = self._balance, self._cones, times(inverse, inverse)
         weighed = times(square, cones.map)
         borne = cones.owned(times(cones.map.swapaxes(0, 1), weighed))

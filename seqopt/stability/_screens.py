@@ -109,11 +109,10 @@ class _Known:
         return self.tightened(np.tile(nothing, (len(places), 1)), places, payload)
 
     def learn(self, answer: Answer, held: Floats) -> _Known:
-        """Keep what an answer proves by itself; a solver's claim is not believed. Return itself.
+        """Keep what an answer proves by itself, and return itself; a solver's claim is not proof.
 
-        A motion that proves nothing with these grips proves no more with fewer.
-
-        ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
+        ``held`` (G,): payload of every grip for which it was found, N; zero for one not held. A
+        motion that proves nothing with these proves no more with fewer.
         """
         assembly, case, motion = self._assembly, self._case, answer.motion
         size = np.abs(motion).max(initial=0.0)
@@ -201,10 +200,9 @@ class HeldStates:
     """One question about one structure, asked of any number of grip sets.
 
     ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed; ``easier``:
-    what a program is asked before that, as forces for a z of zero; ``earlier``: answers to other
-    cases of the same assembly, with the payloads they were found for; what they prove here for a z
-    of zero is known, and new ones join them; ``known``: what is proven so far; ``solved``: how many
-    times the program was called.
+    what a program is asked before; ``earlier``: answers to other cases of the same assembly, with
+    their payloads: what they prove here for a z of zero is known, and new ones join them;
+    ``solved``: how many times the program was called.
     """
 
     def __init__(
@@ -230,9 +228,8 @@ class HeldStates:
     ) -> Floats:
         """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
 
-        ``settled``: says which are narrow enough; ``wanted``: a number for it: what is left open
-        for one is asked again for another. The others, and the result: as of
-        `seqopt.stability._screens._Known.bracket`.
+        As `_Known.bracket`; ``settled``: says which are narrow enough; ``wanted``: a number for it:
+        what is left open for one is asked again for another.
         """
         out = self.known.bracket(places, payload)
         open_ = ~settled(out)
@@ -282,10 +279,7 @@ Part = tuple[int, bool]  # how many bricks stand, and whether the props hold tha
 
 
 class TiltedStates:
-    """One structure with a mortar, pulled sideways.
-
-    ``assembly``: its grips are all that may ever be held; ``up``: unit vector against gravity.
-    """
+    """One structure, whose grips are all that may ever be held, with a mortar, pulled sideways."""
 
     def __init__(
         self, assembly: Assembly, mortar: Mortar, up: Vector, compiled: CompileHeld
@@ -554,8 +548,7 @@ class Margins:
     def bond(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least bond of grip sets at the mortar's friction.
 
-        Result (S, 2): between which values the strength lies, Pa, in tension and at once in shear;
-        infinite if none is enough.
+        Result (S, 2): brackets, Pa, in tension and at once in shear; inf if none is enough.
         """
         bare = Mortar(friction=self.mortar.friction)
         each, assembly = self._brackets("bond", lambda a: [bonded(a, bare)], bricks, held, payload)
@@ -579,8 +572,7 @@ class Margins:
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
 
-        Result (S, 2): between which values it lies, rad; NaN where it is not proven that the
-        structure stands. As `seqopt.stability.assessment.Stability.tilt`.
+        Result (S, 2): brackets, rad, of `Stability.tilt`; NaN where it is not proven to stand.
         """
         screen = self.screens[self.mortar.friction]
         out = np.full((len(np.asarray(held)), 2), np.nan)
@@ -607,8 +599,7 @@ class Margins:
     ) -> Floats:
         """Return the least coefficient of friction at the mortar's bond, by halving intervals.
 
-        ``step``: how narrow the brackets shall be. Result (S, 2): between which values it lies;
-        infinite above where none up to `ROUGHEST` is proven to be enough.
+        ``step``: width of brackets (S, 2); infinite above where `ROUGHEST` is not proven enough.
         """
         sets = np.asarray(held)
         out = np.tile([0.0, np.inf], (len(sets), 1))

@@ -76,10 +76,7 @@ Parts = Callable[[int, Grips], Assembly]
 
 
 def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
-    """Return what an answer proves by itself: that z is zero, or positive; None if neither.
-
-    Forces are looked at if the answer says that they need none.
-    """
+    """Return what an answer proves by itself: that z is zero, or positive; None if neither."""
     if answer.value <= _TIGHT and violation(assembly, case, answer) <= _TIGHT:
         return Proven(0.0, 0.0, 0.0, answer)
     proven = bound(assembly, case, answer) if answer.motion.any() else 0.0
@@ -89,8 +86,7 @@ def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
 class VerdictChain:
     """Proves of one partial structure after the other whether it stands with a mortar.
 
-    Forces and a motion are cached in N, m and rad. Where not the cone program proves a case, z
-    is only as good as the answer to whether it is zero.
+    Where not the cone program proves a case, z says no more than whether it is zero.
     """
 
     def __init__(
@@ -243,9 +239,8 @@ def each_verdict(
 ) -> Iterator[Stability]:
     """Yield the verdict of every step as soon as it is found, without margins, mostly unsolved.
 
-    Of equal partial structures it is asked once. What is found for one is tried on those that
-    follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
-    the steps for which that proves nothing.
+    What is found for one is tried on those that follow, so steps of a build are asked best in their
+    order. ``compiled``: makes the programs where that proves nothing.
     """
     prove = VerdictChain(parts_of(built, steps), mortar, compiled)
     found: dict[tuple[int, Grips], Stability] = {}
@@ -314,8 +309,7 @@ def each_stability(
 ) -> Iterator[Stability]:
     """Yield what `assess_steps` returns, as soon as it is found.
 
-    ``at``: numbers of the steps whose margins are found, by default of all; ``shared``: an executor
-    and among how many workers the steps are shared.
+    ``at``: numbers of steps with margins, by default all; ``shared``: executor and workers.
     """
     numbers = {step.number for step in steps} if at is None else at
     find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())

@@ -214,10 +214,7 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
 
 
 def _verdict_of(stand: Proven) -> Verdict:
-    """Return the verdict where a number is proven that must be zero.
-
-    It falls if the motion says so by itself: forces only show that no more is needed.
-    """
+    """Return the verdict of a number that must be zero: it falls if its motion says so."""
     if np.isnan(stand.value):
         return Verdict.UNDECIDED
     if stand.bound > EXACT:
@@ -226,10 +223,7 @@ def _verdict_of(stand: Proven) -> Verdict:
 
 
 def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return the fastest block and the contact that parts fastest in a motion (B, 6).
-
-    Empty where nothing moves.
-    """
+    """Return the fastest block and the contact that parts fastest in a motion (B, 6), or empty."""
     speed = np.linalg.norm(motion, axis=1)
     if not speed.max(initial=0.0) > 0:
         return "", ""
@@ -244,9 +238,8 @@ def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
 def _least_friction(prove: Prover, mortar: Mortar) -> float:
     """Return the least coefficient of friction with which no bond is lacking, to `_FRICTION_STEP`.
 
-    The lacking bond falls with the friction. A line through two points where some is lacking aims
-    at where none is; where that does not help, the middle is tried. It is infinite if none up to
-    `ROUGHEST` is enough, NaN if nothing is proven.
+    The lacking bond falls with the friction: a line through two points aims at where none is; else
+    the middle is tried. Infinite if `ROUGHEST` is not enough, NaN if nothing is proven.
     """
 
     def lacking(friction: float) -> float:
@@ -277,10 +270,7 @@ def _least_friction(prove: Prover, mortar: Mortar) -> float:
 
 
 def _is_jammed(prove: Prover, mortar: Mortar, least: float) -> bool:
-    """Return whether forces prove hardly any friction enough, but far above all loads.
-
-    ``prove``: of an assembly that stands with the mortar; ``least``: the friction it needs.
-    """
+    """Return whether forces prove hardly any friction enough, but far above all loads."""
     if least > _LITTLE or least == 0:
         return False
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)

@@ -101,10 +101,9 @@ class BuildVerdicts:
 class BuildProver:
     """Says which steps of builds stand; what was asked once is known.
 
-    ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
-    they are called, that of the scene last; without any, nothing is asked; ``progress``: called
-    with the progress; ``refusal``: why no verdict is found, where bricks do not touch; else empty;
-    ``proven``: verdicts that took a proof of their own, which others imply.
+    ``mortars``: by what they are called, that of the scene last; without any, nothing is asked;
+    ``refusal``: why no verdict is found, where bricks do not touch; else empty; ``proven``:
+    verdicts that took a proof of their own.
     """
 
     def __init__(
@@ -183,10 +182,7 @@ def find_prover(
     asks: bool = True,
     own: Mortar | None = None,
 ) -> BuildProver:
-    """Return the prover of verdicts, dry and with a mortar, by default epoxy; or of none.
-
-    ``own``: what a mortar's name stands for, if not what it usually does.
-    """
+    """Return the prover of verdicts, dry and with a mortar, by default epoxy; or of none."""
     own = own or find_mortar(mortar or "epoxy")
     name = mortar if isinstance(mortar, str) else _mortar_name(own)
     shown = {"dry": Mortar(friction=own.friction), name: own}
@@ -198,10 +194,7 @@ def _state(step: Step) -> _State:
 
 
 def _settlement_said(scene: Scene) -> str:
-    """Return that movements of ground ends enter no verdict, in words; empty where none moves.
-
-    Rigid bricks follow the ground, and balance as they did.
-    """
+    """Return in words that movements of ground ends enter no verdict: rigid bricks follow them."""
     every = (ground.movement for ground in scene.grounds)
     moved = [np.reshape(each, (2, 3)) for each in every if each is not None and any(each)]
     if not moved:
@@ -434,8 +427,7 @@ def _motion_word(assembly: Assembly, found: Stability) -> str:
 def _cure(case: _Case, what: str) -> float:
     """Return the least ``bond``, Pa, or ``friction`` with which every step stands.
 
-    It is inf if none is enough and NaN if nothing is proven of a step; and more than what a step is
-    proven to need by `_SURE`, with which the others are asked.
+    Inf if none is enough, NaN if nothing is proven of a step; more than needed by `_SURE`.
     """
     needed = 0.0
     for parts in case.turned:

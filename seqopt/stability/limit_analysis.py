@@ -123,9 +123,7 @@ def limits(
 ) -> tuple[Floats, Floats, Floats]:
     """Return tension and cohesion (K,) and payloads (G,) borne at a z, over the force scale.
 
-    Of what does not grow with z, contacts bear the share that they have of the mortar's bond.
-
-    ``own`` (G,): payload of every grip, N; by default the assembly's.
+    Of what does not grow, contacts bear their share of bond; ``own`` (G,): payloads, N.
     """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     own = assembly.payload if own is None else own
@@ -136,10 +134,7 @@ def limits(
 
 
 def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:
-    """Return by how much the forces of an answer violate a case at most, over the force scale.
-
-    Infinite where the answer is not finite, or of other shapes. ``own``: as of `limits`.
-    """
+    """Return by how much an answer's forces violate a case, over the force scale, or inf."""
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
     if (force.shape, grip.shape) != ((len(assembly.corner), 3), (len(assembly.payload), 3)):
         return np.inf
@@ -158,10 +153,7 @@ def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None
 
 
 def is_finite(assembly: Assembly, answer: Answer) -> bool:
-    """Return whether all numbers of an answer are finite, and as many as the assembly needs.
-
-    What is not finite proves nothing: no comparison holds against it.
-    """
+    """Return whether an answer is finite and of the assembly's shapes; else it proves nothing."""
     parts = answer.contact_force, answer.grip_force, answer.motion
     shapes = [(len(assembly.corner), 3), (len(assembly.payload), 3), (len(assembly.centroid), 6)]
     right = [part.shape for part in parts] == shapes
@@ -224,11 +216,9 @@ _HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
 class Proven(FrozenValue):
     """A number with its two proofs.
 
-    ``value``: z of the case; inf if it is proven that none up to
-    `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven. ``bound``: what the
-    motion alone proves: no smaller z will do, or of a largest z no larger one. ``held``: what
-    forces alone prove: a z that will do; NaN if nothing. ``answer``: what it rests on: forces and
-    motion.
+    ``value``: z of the case; inf if it is proven that none up to `CAP` will do, NaN if nothing is
+    proven; ``bound``: what the motion alone proves: no smaller z will do, or no larger one of a
+    largest z; ``held``: what forces alone prove: a z that will do, or NaN; ``answer``: both.
     """
 
     value: float
@@ -238,10 +228,9 @@ class Proven(FrozenValue):
 
 
 class Prover:
-    """Solves cases of one assembly and proves the answers; counts what the solver claims.
+    """Solves cases of one assembly and proves the answers.
 
-    ``claims``: how the solver ended by its own account, over all cases; ``unproven``: cases of
-    which nothing was proven.
+    ``claims``: how the solver ended by its own account; ``unproven``: cases without proof.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:
@@ -329,12 +318,9 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
 def hulls(angles: Floats, pulls: Floats) -> tuple[Floats, Floats]:
     """Return the pull that is survived in every direction, by what is in some, and its angle.
 
-    ``angles`` (F,), ``pulls`` (S, F): directions, rad, and what is survived there; NaN where that
-    is not known. Results (S,), (S,): the least, and where it is; NaN if those known leave half of
-    all directions out.
+    ``angles`` (F,), ``pulls`` (S, F): directions, rad, and what is survived there, or NaN. Results
+    (S,), (S,): the least, and where; NaN if those known leave half of all directions out.
 
-    Examples
-    --------
     >>> pull, angle = hulls(np.pi / 2 * np.arange(4), np.array([[1.0, 1, 3, 3]]))
     >>> round(float(pull[0]), 4), round(float(angle[0]), 4)
     (0.7071, 0.7854)

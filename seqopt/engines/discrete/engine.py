@@ -119,10 +119,7 @@ class _System(FrozenValue):
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
 
     def beds(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness of the beds for twists across them, (6J, 6J).
-
-        ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
-        """
+        """Return the stiffness (6J, 6J) of the beds for twists across; slopes as of `_Points`."""
         falls = (slope @ self.maps).reshape(-1, 6)
         maps, ends = self.maps.reshape(-1, 6), [*3 * self._starts, None]
         parts = [slice(*part) for part in pairwise(ends)]
@@ -141,11 +138,10 @@ class _System(FrozenValue):
 def _build_system(
     network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None
 ) -> _System:
-    """Return the system of a partial structure.
+    """Return the system of a partial structure; raises `SceneError` if faces do not overlap.
 
-    ``mortar``: what the beds hold. ``bed``: the joints themselves; by default beds in series with
-    layers are as stiff as the scene says. Raises `SceneError` if the faces of a joint do not
-    overlap.
+    ``bed``: the joints themselves; by default beds in series with layers, as stiff as the scene
+    says.
     """
     assembly, acting = bare_assembly(network, bricks), network.springs.acting(bricks)
     bed_points = face_quadrature(assembly)
@@ -218,9 +214,8 @@ class _Held:
     """A system and the forces of its grips.
 
     ``free`` (6n, m): motions that the grips leave; ``pads`` (6n, 6n): stiffness of compliant grips;
-    ``far`` (6n,): how grips move the bodies that they hold, all the way; ``pull`` (6n,): how
-    compliant grips pull at bodies that stay, all the way. ``diagonal`` (m,): of the unbroken
-    stiffness in the free motions.
+    ``far``, ``pull`` (6n,): how grips move the bodies that they hold, and pull at those that stay,
+    all the way; ``diagonal`` (m,): of the unbroken stiffness in the free motions.
     """
 
     def __init__(
@@ -271,10 +266,7 @@ class _Held:
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness (m, m) in the free motions.
-
-        ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
-        """
+        """Return the stiffness (m, m) in the free motions; slopes as of `_Points.forces`."""
         across = self._across
         return sparse.csr_array(across.T @ self.system.beds(slope) @ across + self._unbroken)
 
@@ -385,12 +377,11 @@ def _newton(held: _Held, state: _Settled, share: float, resistance: float) -> _S
 class DiscreteEngine(OpeningEngine):
     """Solves each grip set by discrete elements.
 
-    Raises `MechanismError`: also if the structure moves a tenth of a brick's length and is not
-    stopped by then; `SolverError`: also if it neither comes to rest nor goes; `SceneError` if the
-    faces of a joint do not overlap.
+    Raises `MechanismError` also if the structure moves a tenth of a brick's length and is not
+    stopped by then; `SolverError` also if it neither rests nor goes; `SceneError` if faces do not
+    overlap.
 
-    ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``bed``: the joints
-    themselves; by default they are as stiff as the scene says.
+    ``bed``: the joints themselves; by default they are as stiff as the scene says.
     """
 
     def __init__(
@@ -471,10 +462,7 @@ def _held_nodes(
 def _fields(
     network: Network, held: _Held, found: _Settled, columns: Ints, springs: list[_Spring]
 ) -> Fields:
-    """Return the fields of one grip set.
-
-    Two rigid grips on one brick share so that their forces are as small as can be.
-    """
+    """Return the fields of one grip set; two rigid grips on one brick share with least forces."""
     system, moved = held.system, held.moved(found.motion)
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[system.acting] = system.bed_wrenches(found.force)

@@ -149,10 +149,9 @@ class GrownExtremes:
         )
 
     def solve(self, columns: Ints, want: Want, most: float) -> tuple[Floats, Floats, Bools]:
-        """Return extremes (4, S) of rigid grips, forces (S, r), and which sets have others.
+        """Return extremes (4, S) and forces (S, r) of rigid grips, and which sets err more.
 
-        These are answered not well enough. Two grips on one brick share. ``most``: as of
-        `well_conditioned`.
+        ``most``: as of `well_conditioned`.
         """
         grown, maps, axis = self._grown, self._maps, self._part.axis
         solution, pivot = _solve_grips(grown, columns, np.stack([axis, -axis], 1).reshape(-1, 3))
@@ -176,10 +175,7 @@ class GrownExtremes:
 
 
 def _solve_grips(grown: Grown, columns: Ints, across: Floats) -> tuple[Floats, Floats]:
-    """Return forces (k, S) that hold nodes (S, r) still, and scaled pivots (k, S).
-
-    ``across``: as of `pairs_of`.
-    """
+    """Return forces (k, S) that hold nodes (S, r) still, and scaled pivots (k, S)."""
     sets, count = len(columns), 3 * columns.shape[1]
     at = 6 * (columns // 2)[..., None] + np.arange(6)
     rows = 3 * (columns % 2)[..., None] + np.arange(3)

@@ -75,8 +75,7 @@ class _Border(NamedTuple):
 class FrontalFactor:
     """The scaled stiffness of a growing structure, factored brick by brick in build order.
 
-    ``whole``: the system of the whole structure, whose units it keeps; ``at_once``: bricks of a
-    block.
+    ``whole``: of the whole structure, whose units it keeps; ``at_once``: bricks of a block.
     """
 
     def __init__(self, whole: Ungripped, at_once: int) -> None:
@@ -140,10 +139,7 @@ class FrontalFactor:
         self.front = self.front[~done]
 
     def border(self, rows: Floats, corner: Floats) -> _Border:
-        """Return the front bordered by grips, factored; a `LinAlgError` if that is singular.
-
-        ``rows`` (c, 6b), ``corner`` (c, c): as the module displays them.
-        """
+        """Return the front bordered by grips, factored; raises `LinAlgError` if it is singular."""
         rows, corner, passed = rows.copy(), corner.copy(), list[tuple[Floats, Floats] | None]()
         for own, front, factor, carried, _ in self.blocks:
             here = rows[:, own]
@@ -209,8 +205,7 @@ class FrontalSystem:
         """Return all fields of grip sets (S, r).
 
         ``largest``: correction of a set after which it needs no other. Raises `SolverError` where
-        only grips or something soft hold a part, which blocks of the stiffness do not tell from
-        rounding.
+        only grips or something soft hold a part: blocks do not tell that from rounding.
         """
         network = self._network
         if self._last is None or self._last[0].bricks != bricks:

@@ -122,10 +122,7 @@ class Growth:
         self._start()
 
     def reach(self, bricks: int) -> None:
-        """Let a number of bricks stand, at most as many as the tree has.
-
-        More than stand are added; fewer are begun anew.
-        """
+        """Let a number of bricks stand, at most the tree's; fewer than before are begun anew."""
         if bricks < self.bricks:
             self._start()
         while self.bricks < bricks:
@@ -140,10 +137,7 @@ class Growth:
             self._before = _Before(weighed, loss, closing, changes)
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
-        """Return motions of bricks under the weight, and under unit wrenches on some bricks (h,).
-
-        Results: twists and wrenches, 1 + kh rows; the loss (h,).
-        """
+        """Return twists and wrenches (1 + kh, n) by the weight and unit wrenches, and loss (h,)."""
         last = self.remembers and self._before is not None
         if not self.bricks - last <= bricks <= self.bricks:
             self.reach(bricks)

@@ -61,12 +61,11 @@ class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
     ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
-    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled deformation
-    of the acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
-    ``load`` (6b,): weight and loads, scaled;
-    ``moved`` (6s,): what the ground's movement adds to the joints' equations; ``acting`` (s,);
-    ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad, scaled
-    wrenches into N and N m; ``unit``: N/m.
+    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled, of the
+    acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
+    ``load`` (6b,): weight and loads, scaled; ``moved`` (6s,): what the ground's movement adds to
+    the joints' equations; ``acting`` (s,); ``twist_unit`` (6b,), ``wrench_unit`` (6s,): scaled
+    twists to m and rad, wrenches to N and N m; ``unit``: N/m.
     """
 
     network: Network
@@ -172,10 +171,8 @@ def free_motion(
 ) -> Floats | None:
     """Return a motion that deforms no spring with any stiffness and moves no held node.
 
-    How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
-    has nothing to hide behind.
-
-    Result (b, 6): as `seqopt.engines.diagnosis.Diagnosis.mode`; None if there is no such motion.
+    A soft spring ties as well as a stiff one, so that rounding has nothing to hide behind. Result
+    (b, 6): as `seqopt.engines.diagnosis.Diagnosis.mode`; None if there is no such motion.
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
@@ -196,10 +193,7 @@ def free_motion(
 def require_resistance(
     network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> None:
-    """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
-
-    A compliant grip resists as a rigid one does. ``compliance``: of this set.
-    """
+    """Raise `MechanismError` if a grip set, rigid or compliant, leaves a motion unresisted."""
     motion = free_motion(network, bricks, columns, compliance)
     if motion is not None:
         ends = network.node_position[network.inner[:bricks]]
@@ -274,8 +268,7 @@ def respond(
 def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
     """Return the edge forces (S, E), tension positive.
 
-    ``wrench`` (S, J, 6): as of `Solution`; ``load`` (S, 2b, 3): forces at the inner nodes, those of
-    grips among them.
+    ``wrench``: as of `Solution`; ``load`` (S, 2b, 3): at the inner nodes, forces of grips included.
     """
     sets, bricks = len(load), load.shape[1] // 2
     edges = network.count_edges(bricks)
@@ -296,8 +289,7 @@ def split_pairs(
 ) -> None:
     """Let each of two rigid grips on one brick take the force at its own node, in place.
 
-    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``compliant`` (S, r): which
-    grips are.
+    ``force`` (S, r, 3), ``carried`` (S, E): of grips and edges; ``compliant`` (S, r): soft grips.
     """
     compliant = np.zeros(columns.shape, dtype=bool) if compliant is None else compliant
     inner = np.flatnonzero(network.edge_spring < 0)
@@ -355,8 +347,7 @@ def mixed_system(
 ) -> MixedSystem:
     """Return the system of one grip set.
 
-    ``shift`` (6b,): added to the diagonal of the scaled stiffness, so that a mechanism can be
-    factored; ``compliance``: of this set.
+    ``shift`` (6b,): added to the diagonal of the scaled stiffness, to factor a mechanism.
     """
     rows, force, corner = held_rows(parts, grips, compliance)
     weight = 1 / np.maximum(1.0, np.diag(corner))
@@ -371,12 +362,11 @@ def mixed_system(
 def _with_flexibility(
     parts: Ungripped, grips: Ints, rows: Floats, force: Floats, compliance: GripCompliance
 ) -> tuple[Floats, Floats, Floats]:
-    """Return rows of motions, forces and flexibilities of a set with compliant grips.
+    """Return rows of motions (n, 6b), forces (rw, n) and flexibilities (n, n) of compliant grips.
 
     After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
     the force between two grips on one brick of which one is compliant, which moves no brick, and
-    those of moments. Results: ``rows`` (n, 6b); ``force`` (rw, n): of each grip, then its moments
-    over the lever; ``flexibility`` (n, n): m/N.
+    those of moments, over the lever.
     """
     network, count = parts.network, len(grips)
     yields, turns = compliance.compliant(1, count)[0], compliance.transmits(1, count)[0]
@@ -410,8 +400,7 @@ def bordered(
 ) -> sparse.csc_array:
     """Return a system (6s + 6b,) in which products of rows (c, 6b) with twists are zero too.
 
-    ``corner`` (c, c): what multipliers add to them; ``weight`` (c,): by which these equations,
-    all but the corner, are multiplied.
+    ``corner`` (c, c): what multipliers add; ``weight`` (c,): of these equations but the corner.
     """
     if not rows.shape[0]:
         return sparse.csc_array(matrix)
@@ -452,10 +441,9 @@ _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it make
 def solve_mixed(
     network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Fields:
-    """Return the fields of grip sets, one factorization for each.
+    """Return the fields of grip sets, one factorization for each; raises as `solve_load`.
 
-    A mechanism that no load excites passes: `seqopt.engines.rigid._mixed.require_resistance`
-    finds it. Raises as `solve_load`.
+    A mechanism that no load excites passes: `require_resistance` finds it.
     """
     parts = ungripped_system(network, bricks)
     answers = [no_sets(network, bricks, columns.shape[1])]
@@ -546,10 +534,7 @@ def borne(
 def unchanged(
     parts: Ungripped, states: Floats, corrections: Floats, largest: float = LAST_CORRECTION
 ) -> Bools:
-    """Return whether corrections (S, 6s + 6b) are small beside forces, moments, shifts and turns.
-
-    ``largest``: that counts as small.
-    """
+    """Return whether corrections (S, 6s + 6b) of forces, moments, shifts and turns are small."""
     return are_small(parts, sizes(parts, states), sizes(parts, corrections), largest)
 
 
@@ -577,10 +562,10 @@ _SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double
 def add_products(start: Floats, matrix: sparse.csr_array, factors: Floats) -> Floats:
     """Return ``start + matrix @ factors``, of vectors, with twice the digits before it is rounded.
 
-    Residuals of a solution ``x`` are those of a load with the factors ``-x``. In plain doubles they
-    are mostly rounding, which differs between processors. Here the rounding errors of all products
-    and sums are summed too, by operations that every processor rounds alike (``Dot2`` of Ogita,
-    Rump and Oishi, SIAM Journal on Scientific Computing 26 (2005) 1955-1988).
+    Residuals of a solution ``x``, with the factors ``-x``, are mostly rounding in plain doubles,
+    which differs between processors. Here the rounding errors of products and sums are summed too,
+    by operations that every processor rounds alike (``Dot2`` of Ogita, Rump and Oishi, SIAM Journal
+    on Scientific Computing 26 (2005) 1955-1988).
     """
     count = np.diff(matrix.indptr)
     total, lost = start.copy(), np.zeros_like(start)

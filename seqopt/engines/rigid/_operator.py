@@ -99,8 +99,7 @@ class ResponseMaps(FrozenValue):
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states, edge forces without those of loads on the inner edges.
 
-        ``states`` (S, n): wrenches; of displacements and brick twists, twists. ``out`` (S, Q):
-        where to put it.
+        ``states`` (S, n): wrenches, or twists of displacements and brick twists; ``out`` (S, Q).
         """
         out = np.empty((len(states), self.count(name))) if out is None else out
         if name == "support":
@@ -127,11 +126,7 @@ _FEW = 200  # loads whose responses take little, and are always made once for al
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Doubts(FrozenValue):
-    """Error bounds of rounding: by load its own motion, the weight, and lost digits.
-
-    Arrays are the flexibility's diagonal, ``dead_displacement`` and ``loss`` (l,) of
-    `ComplianceOperator`.
-    """
+    """Error bounds of rounding, (l,): by a load's own flexibility, the weight, and lost digits."""
 
     flexibility: Floats
     dead: Floats
@@ -227,10 +222,7 @@ class ComplianceOperator(FrozenValue):
         return rows
 
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> sparse.csr_array:
-        """Return forces (S, k) at loads (S, k) beside a share of the weight, the last of the rows.
-
-        Result (S, l + 1): times the rows of a response map, the sums of sets.
-        """
+        """Return forces (S, k) at loads (S, k) and a share of the weight as a matrix (S, l + 1)."""
         (sets, loads), count = index.shape, len(self.twist)
         rows, share = np.empty((sets, loads + 1), dtype=np.int32), np.empty((sets, loads + 1))
         rows[:, :-1], share[:, :-1] = index, force
@@ -301,18 +293,14 @@ class ComplianceOperator(FrozenValue):
 
 
 def are_few(unknowns: int, sets: int) -> bool:
-    """Return whether loads are few beside grip sets: of both nodes of bricks in all directions.
-
-    ``unknowns``: bricks times directions.
-    """
+    """Return whether loads are few beside grip sets; ``unknowns``: bricks times directions."""
     return 2 * unknowns <= max(_FEW, sets)
 
 
 def load_rows(nodes: Ints, moments: int) -> Ints:
     """Return the loads (S, rw) at nodes (S, r): the forces at each, then the moments on its brick.
 
-    ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded; ``moments``:
-    of a brick, three or none.
+    ``nodes``: as indices into inner nodes of the loaded bricks; ``moments``: of a brick, 3 or 0.
     """
     first = ((6 + moments) * (nodes // 2))[..., None]
     rows = first + 3 * (nodes % 2)[..., None] + np.arange(3)
@@ -336,10 +324,7 @@ class OperatorBuilder:
             self.nodes = np.concatenate([self.nodes, every], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
-        """Return the operator of at most as many bricks as the tree has.
-
-        ``held`` (h,): the bricks at whose nodes loads act, ascending; all by default.
-        """
+        """Return the operator of at most the tree's bricks; loads act on bricks (h,), or on all."""
         held = np.arange(bricks) if held is None else np.asarray(held)
         which = slice(bricks) if len(held) == bricks else held
         nodes = self.nodes[which]
@@ -363,10 +348,7 @@ class OperatorBuilder:
 
 
 def _at_nodes(nodes: Floats, answers: Floats) -> Floats:
-    """Return the response maps of unit loads at nodes of bricks (h, w, k), and of the weight last.
-
-    ``answers`` (1 + kh, n): of the weight and unit wrenches on these bricks.
-    """
+    """Return answers (hw + 1, n) to loads at nodes (h, w, k), weight last, from those on bricks."""
     (h, w, k), width = nodes.shape, answers.shape[1]
     out = np.empty((h * w + 1, width))
     np.matmul(nodes, answers[1:].reshape(h, k, width), out=out[:-1].reshape(h, w, width))
@@ -477,11 +459,8 @@ def grip_forces(
 ) -> GripForces:
     """Return the forces of grips, by which their nodes stay, or go as far as they are compliant.
 
-    Two rigid grips on one rigid brick leave the force between them along the brick undetermined:
-    `share_pairs` says how they share it.
-
-    ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
-    the sets, if they are known; ``compliance``: of the sets.
+    Two rigid grips on one brick leave the force between them undetermined: see `share_pairs`.
+    ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`.
     """
     pairs = pairs_of(operator.across, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
@@ -532,13 +511,10 @@ def well_conditioned(
 def share_pairs(
     operator: ComplianceOperator, index: Ints, force: Floats, carried: Floats, pairs: Pairs
 ) -> None:
-    """Let each of two grips on one brick take the force at its own node.
+    """Let each of two grips on one brick take the force at its own node, in place.
 
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
-    Nothing else in the structure changes.
-
-    ``force`` (S, k), ``carried`` (S, E), (S, 0): of grips and edges, changed in place, N; where
-    there are none of edges, they are computed. Others: as of `grip_forces`.
+    ``force`` (S, k), ``carried`` (S, E): of grips and edges, N; (S, 0): they are computed.
     """
     if not len(pairs.sets):
         return

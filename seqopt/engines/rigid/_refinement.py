@@ -139,10 +139,9 @@ _TIED = 0.1  # most that what resists loose motions may be of the springs that t
 def _held_operator(
     system: _HeldSystem, inner: sparse.csr_array | None = None
 ) -> ComplianceOperator:
-    """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
+    """Return the operator of a structure whose loose motions are unknowns, with loads of their own.
 
-    It is of all directions of space, with a load for each loose motion after those of the nodes.
-    ``inner`` (l, 6b): what the loads do to scaled twists; by default forces at the inner nodes.
+    ``inner`` (l, 6b): what loads do to scaled twists; by default forces at the inner nodes.
     """
     parts, loose = system.parts, system.loose
     inner = parts.inner if inner is None else inner
@@ -238,9 +237,8 @@ class Refinement:
     ) -> Fields:
         """Return all fields of grip sets.
 
-        ``operator``: with wrenches and twists, if there is one for these grips; it serves if
-        nothing is loose. ``largest``: correction of a set after which it needs no other, over the
-        largest of each kind. ``compliance``: of the sets.
+        ``operator``: of these grips, if there is one; it serves if nothing is loose. ``largest``:
+        correction of a set after which it needs no other, over the largest of each kind.
         """
         every = [slice(i, i + _TOGETHER) for i in range(0, len(columns), _TOGETHER)]
         if operator is None or self.held.loose:

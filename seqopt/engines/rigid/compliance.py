@@ -68,8 +68,7 @@ class _FastSolution:
     """What an operator alone says about grip sets.
 
     ``even``: whether the joints are about equally stiff: where not, pivots do not bound the error;
-    ``accuracy``: largest error of fields, over the largest entry of each, that is accepted;
-    ``well_conditioned`` (S,): which sets are answered as well as that.
+    ``accuracy``: as of the engine; ``well_conditioned`` (S,): which sets meet it.
     """
 
     def __init__(
@@ -245,8 +244,7 @@ class ComplianceEngine(NamedEngine):
     ) -> Extremes:
         """Return the extremes of the fields that are wanted, for grip sets (S, r).
 
-        ``compiled``: whether by compiled loops, where numba is there and sets are few beside the
-        nodes; else they are taken from the fields.
+        ``compiled``: by compiled loops, where numba is there and sets are few beside the nodes.
         """
         columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self.network, columns, numbers, None)
