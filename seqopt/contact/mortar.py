@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -142,32 +142,28 @@ class Curing(Terse):
     points: Points = ()
 
     def __post_init__(self) -> None:
-        settle(self, points=_checked("curing", self.points))
+        what = "pairs of an age (s) and a share"
+        pairs = [rows("curing", pair, what) for pair in rows("curing", self.points, what)]
+        if any(len(pair) != 2 for pair in pairs):
+            raise SceneError(f"curing: points are {short(pairs)}; give {what}")
+        out = tuple(
+            (finite("curing: age", age, 0.0), finite("curing: share", share, 0.0))
+            for age, share in pairs
+        )
+        for before, after in pairwise(out):
+            if not (before[0] < after[0] and before[1] < after[1]):
+                raise SceneError(
+                    f"curing: {before} comes before {after}; ages and shares must rise"
+                )
+        if out and out[-1][1] != 1.0:
+            wrong = f"curing: the last share is {out[-1][1]:g}"
+            raise SceneError(f"{wrong}; give 1 last, and a weaker mortar for less")
+        settle(self, points=tuple(pair for pair in out if pair[1] > 0))
 
     def __str__(self) -> str:
         if self.points and self.points == _linear(self.points[-1][0]):
             return f"{self.points[-1][0]:g}s"
         return ",".join(f"{age:g}s={share:g}" for age, share in self.points) or "never"
-
-
-def _checked(where: str, given: Iterable[Sequence[float]]) -> Points:
-    """Return points whose ages and shares rise, up to a share of 1."""
-    what = "pairs of an age (s) and a share"
-    pairs = [rows(where, pair, what) for pair in rows(where, given, what)]
-    if any(len(pair) != 2 for pair in pairs):
-        raise SceneError(f"{where}: points are {short(pairs)}; give {what}")
-    out = tuple(
-        (finite(f"{where}: age", age, 0.0), finite(f"{where}: share", share, 0.0))
-        for age, share in pairs
-    )
-    for before, after in pairwise(out):
-        if not (before[0] < after[0] and before[1] < after[1]):
-            raise SceneError(f"{where}: {before} comes before {after}; ages and shares must rise")
-    if out and out[-1][1] != 1.0:
-        raise SceneError(
-            f"{where}: the last share is {out[-1][1]:g}; give 1 last, and a weaker mortar for less"
-        )
-    return tuple(pair for pair in out if pair[1] > 0)
 
 
 def _linear(seconds: float) -> Points:

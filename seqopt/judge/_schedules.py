@@ -29,7 +29,7 @@ from seqopt.judge.certificate import TOLERANCE, Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.resources import StepArrays, _first_fault
 from seqopt.problem.standing import _size, slack
-from seqopt.responses._tolerance import is_tolerance, misfits_along, tolerances_along
+from seqopt.responses._tolerance import is_tolerance, misfits_along, step_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, EXCESS_COLUMN, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.scene._armed import check_postures
@@ -313,7 +313,8 @@ def _responses(problem: States, steps: Sequence[Step], table: _Columns) -> dict[
         elif name == PROP_EXCESS:
             out[name] = np.asarray(table[EXCESS_COLUMN], dtype=float)
         elif is_tolerance(name):
-            out[name] = misfits_along(tolerances_along(problem.engine, steps))
+            each = [step_tolerance(problem.engine, step).distance for step in steps]
+            out[name] = misfits_along(1e3 * np.array(each))
         elif name != LARGEST:
             chosen = CHOSEN_BY[name]
             out[name] = np.asarray(table[chosen.column], dtype=float) / chosen.scale

@@ -19,7 +19,7 @@ at most the largest of its values at these over the distance of their plane.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -162,11 +162,6 @@ def step_tolerance(engine: Engine, step: Step) -> Tolerance:
     far = worst_misplacement(forces.some(slice(at, at + 1)), direction[at : at + 1])[0] / rates[at]
     what = f"payload of {holding[at]}"
     return Tolerance(1 / rates[at], 1 / highest.max(), what, tuple(map(tuple, far.tolist())))
-
-
-def tolerances_along(engine: Engine, steps: Sequence[Step]) -> list[float]:
-    """Return the tolerances of steps, mm."""
-    return [1e3 * step_tolerance(engine, step).distance for step in steps]
 
 
 def misfits_along(tolerances: ArrayLike) -> Floats:

@@ -508,7 +508,6 @@ def held_parts(
 
 
 _Cases = Callable[[Assembly], list[Case]]
-_PUSHED = "the least payload is not found where props only push"
 
 
 class Margins:
@@ -561,7 +560,8 @@ class Margins:
         which values it lies, N; infinite if none is enough. Not where props only push.
         """
         if any(prop.direction for prop in self.network.scene.props):
-            raise SceneError(f"{_PUSHED}; leave payloads out of the margins")
+            said = "the least payload is not found where props only push"
+            raise SceneError(f"{said}; leave payloads out of the margins")
 
         def cases(assembly: Assembly) -> list[Case]:
             return [replace(bonded(assembly, self.mortar).fixed(), payload=(0.0, 1.0))]

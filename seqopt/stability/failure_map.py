@@ -8,10 +8,9 @@ sought where they fall: one step's need is proven, and only those that still fal
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -123,28 +122,21 @@ class BuildProver:
         self, builds: Mapping[str, Sequence[Step]]
     ) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Return the verdicts of builds by their steps, one for every mortar."""
+        distinct = {_state(step): step for steps in builds.values() for step in steps}
+        # one that fewer hold comes before others, which its forces prove
+        ordered = sorted(distinct.values(), key=lambda step: (step.bricks, len(step.held)))
+        try:
+            for name in () if self.refusal else self.mortars:
+                self._ask(name, [s for s in ordered if _state(s) not in self._known[name]])
+        except SceneError as error:
+            self.refusal = str(error)
         return {
             build: tuple(self._of_build(steps, name) for name in self.mortars)
             for build, steps in builds.items()
-            if self._ask(chain.from_iterable(builds.values()))
+            if self.mortars and not self.refusal
         }
 
-    def _ask(self, steps: Iterable[Step]) -> bool:
-        """Find the verdicts that are not cached; return whether there are verdicts at all."""
-        # one that fewer hold comes before others, which its forces prove
-        distinct = sorted(
-            {_state(step): step for step in steps}.values(), key=lambda s: (s.bricks, len(s.held))
-        )
-        for name in () if self.refusal else self.mortars:
-            new = [step for step in distinct if _state(step) not in self._known[name]]
-            try:
-                self._ask_all(name, new)
-            except SceneError as error:
-                self.refusal = str(error)
-                return False
-        return bool(self.mortars) and not self.refusal
-
-    def _ask_all(self, name: str, new: Sequence[Step]) -> None:
+    def _ask(self, name: str, new: Sequence[Step]) -> None:
         """Find the verdicts of steps with a mortar, and those implied with other mortars."""
         if not new:
             return

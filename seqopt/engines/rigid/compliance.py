@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seqopt._later import Later
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import (
     RIGID,
@@ -57,6 +58,10 @@ if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes
     from seqopt.engines.rigid._frontal import FrontalSystem
     from seqopt.engines.rigid._refinement import Refinement
+
+_EXTREMES = Later("seqopt.engines.rigid._extremes")  # with numba alone
+_FRONTAL = Later("seqopt.engines.rigid._frontal")  # of large scenes alone
+_REFINEMENT = Later("seqopt.engines.rigid._refinement")  # few sets need any
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
@@ -194,7 +199,7 @@ class ComplianceEngine(NamedEngine):
     def __init__(self, network: Network | Scene, accuracy: float = ACCURACY) -> None:
         super().__init__(network)
         self._accuracy = accuracy
-        self._tree, self._uniform = grow_tree(self.network), _count_uniform(self.network)
+        self._tree = grow_tree(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._refinement: Refinement | None = None  # of the brick count that was corrected last
         self._grown: GrownExtremes | None = None  # what answers few grip sets of large structures
@@ -258,9 +263,7 @@ class ComplianceEngine(NamedEngine):
         moves = large and (self.network.springs.movement.any() or self._builder.moments)
         if large and not moves and self._builder.growth.bricks <= bricks:
             if self._grown is None:
-                from seqopt.engines.rigid._extremes import GrownExtremes  # noqa: PLC0415  # numba
-
-                self._grown = GrownExtremes(self._builder)
+                self._grown = _EXTREMES.GrownExtremes(self._builder)
             self._grown.reach(bricks)
             found, size, apart = self._grown.solve(columns, want, self._accepted(want) / _UNSEEN)
         if np.count_nonzero(apart):
@@ -289,6 +292,18 @@ class ComplianceEngine(NamedEngine):
         return known
 
     @cached_property
+    def _uniform(self) -> int:
+        """Up to how many bricks all joints that act are about equally stiff."""
+        springs = self.network.springs
+        order = np.argsort(springs.since, kind="stable")
+        even = np.ones(len(order), dtype=bool)
+        for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
+            low = np.minimum.accumulate(stiffness[order].min(axis=1))
+            even &= low >= _EVEN * np.maximum.accumulate(stiffness[order].max(axis=1))
+        every = len(self.network.inner)
+        return every if even.all() else int(springs.since[order][even.argmin()]) - 1
+
+    @cached_property
     def _shared(self) -> Shared:
         """What the systems that correct answers are cut from."""
         return share(self.network)
@@ -300,32 +315,20 @@ class ComplianceEngine(NamedEngine):
 
     @cached_property
     def _frontal(self) -> FrontalSystem:
-        from seqopt.engines.rigid._frontal import FrontalSystem  # noqa: PLC0415  # large scenes only
-
-        return FrontalSystem(self.network)
+        found: FrontalSystem = _FRONTAL.FrontalSystem(self.network)
+        return found
 
     def _refined(
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
         """Return the fields of grip sets for which the operator is not accurate enough."""
-        from seqopt.engines.rigid._refinement import Refinement  # noqa: PLC0415  # few need any
-
         tied = bricks <= len(self._tree.spring)  # the tree that operators grow on reaches them all
         operator = self._operator(bricks, columns) if tied else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self.network, bricks, self._shared, tied=tied)
+                self._refinement = _REFINEMENT.Refinement(
+                    self.network, bricks, self._shared, tied=tied
+                )
             last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
-
-
-def _count_uniform(network: Network) -> int:
-    """Return up to how many bricks all joints that act are about equally stiff."""
-    springs = network.springs
-    order = np.argsort(springs.since, kind="stable")
-    even = np.ones(len(order), dtype=bool)
-    for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
-        low = np.minimum.accumulate(stiffness[order].min(axis=1))
-        even &= low >= _EVEN * np.maximum.accumulate(stiffness[order].max(axis=1))
-    return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1
