@@ -1,6 +1,7 @@
 """Responses of steps as a table: the columns of Tables A.1 and A.2 of Bruun et al.
 
-Also its grips: robot, node, first and last step, and force.
+Also its grips: robot, node, first and last step, and force; and whether the model was enough:
+steps within the range of a linear one, and what others would change.
 """
 
 from __future__ import annotations
@@ -51,167 +52,11 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import holds
 from seqopt.sequence.steps import Grips, Step, StepKind, require_steps
 
-_MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
-_TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
-_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
 _Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
 """A table of `analyze`, or its columns by name: where no table is needed, pandas takes long."""
 _Key = tuple[int, tuple[int, ...]]  # bricks that stand, and what is held
 _Held = tuple[int, int, tuple[int, ...]]
 """Number of a step, its bricks, and what is held."""
-OUTSIDE = "outside the linear range"
-FAR_OFF = "displacement"
-REMEDY = (
-    "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
-    "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
-    "Where only stress is too large, the engine discrete lets joints open and break."
-)
-
-
-@dataclass(frozen=True)
-class Departure:
-    """A limit of the linear range that some steps exceed."""
-
-    what: str  # what is too large, in a word or two
-    said: str  # the largest value, the limit, and why it is one
-    steps: tuple[int, ...]  # numbers of the steps
-
-    def __str__(self) -> str:
-        return f"{self.what} of up to {self.said} ({_steps_in_words(self.steps)})"
-
-
-class LinearRange:
-    """Checks the steps of builds against the linear range of an engine.
-
-    ``mortar``: with the elastic limits of joints; ``unchecked``: why stresses in joints are not
-    checked, or empty; ``far``: the limit of displacements, m; ``offs``: cached tolerances, m.
-    """
-
-    def __init__(self, engine: Engine) -> None:
-        self.engine, self._network = engine, engine.network
-        self._breaks = isinstance(engine, AutoEngine | OpeningEngine)
-        self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
-        self.far = linear_limit(engine.network.scene)
-        self._known: dict[_Key, Floats] = {}
-        self.offs: dict[_Key, float] = {}
-        thickness = engine.network.springs.thickness
-        self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
-        self.unchecked: tuple[str, ...] = ()
-        chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
-        self.mortar = EPOXY if chooser is None else chooser.mortar
-        self._limits = None if chooser is None else chooser.limits
-        try:
-            if self._limits is None and not self._breaks:
-                self._limits = find_elastic_limits(engine.network, self.mortar)
-        except SceneError as error:
-            self.unchecked = (f"stresses in joints are not checked: {error}",)
-
-    def departures(self, table: _Columns) -> tuple[Departure, ...]:
-        """Return the limits that the steps of a build exceed, by their table of `seqopt.analyze`.
-
-        Examples
-        --------
-        >>> import seqopt
-        >>> from seqopt.responses.table import LinearRange
-        >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-        >>> table = seqopt.analyze(engine, seqopt.sequential(engine.network))
-        >>> LinearRange(engine).departures(table)
-        ()
-        """
-        shift, far = RESPONSES["D_max"], self.far
-        moved = np.asarray(table[shift.column], dtype=float) / shift.scale
-        turned, strained, stressed = self._measured(table)[:, :3].T
-        stressed = np.where(self._breaks, -np.inf, stressed)
-        steps = np.asarray(table["step"], dtype=int)
-        within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
-        deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
-        mortar = self.mortar
-        strength = (
-            f"{{:.3g}} MPa beyond what {_mortar_name(mortar)} holds, "
-            f"{mortar.tensile_strength / 1e6:g} MPa in tension, {mortar.cohesion / 1e6:g} MPa and "
-            "friction in shear"
-        ).format
-        found = (
-            (FAR_OFF, moved, far, lambda most: length_text(most) + within),
-            ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
-            ("deformation of a joint", strained, _STRAIN, deformed),
-            ("stress in a joint", stressed, 0.0, lambda most: strength(most / 1e6)),
-        )
-        return tuple(
-            Departure(what, say(float(values[over].max())), tuple(steps[over].tolist()))
-            for what, values, most, say in found
-            if (over := ~(values <= most)).any()  # what is not a number is not within
-        )
-
-    def seen(self, step: Step, fields: Fields) -> Fields:
-        """Return all fields of a step, and cache its measures."""
-        (found,) = self._of(fields)
-        if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
-            numbers = self._network.scene.grip_numbers(step.grips, step.bricks)
-            self._known[step.bricks, numbers] = found
-        return fields
-
-    def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
-        """Return the limits that builds exceed, for those that exceed any, by name."""
-        self._measured(*tables.values())
-        return {name: left for name, each in tables.items() if (left := self.departures(each))}
-
-    def closest(self, table: _Columns) -> tuple[float, str, int]:
-        """Return margin, Pa, name and step of the joint closest to its limits; NaN if unknown."""
-        excess, joint = self._measured(table)[:, 2:].T
-        at = int(excess.argmax())
-        if self._limits is None or not np.isfinite(excess[at]):
-            return np.nan, "", 0
-        name = self._limits.assembly.contact_name[int(joint[at])]
-        return -float(excess[at]), f"joint {name}", int(np.asarray(table["step"])[at])
-
-    def _measured(self, *tables: _Columns) -> Floats:
-        """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
-        every = [held_in_table(self._network.scene, table) for table in tables]
-        keys = [(bricks, held) for _, bricks, held in chain.from_iterable(every)]
-        if isinstance(self._engine, OpeningEngine):
-            return np.full((len(keys), 4), -np.inf)  # far motions are unstable
-        new = [key for key in keys if key not in self._known]
-        self._known |= {key: np.array([0.0, 0.0, -np.inf, 0.0]) for key in new if not key[0]}
-        for alike, fields in _solved_alike(self._engine, new, _MEASURED):
-            self._known.update(zip(alike, self._of(fields), strict=True))
-        return np.array([self._known[key] for key in keys])
-
-    def _of(self, fields: Fields) -> Floats:
-        """Return rotation, rad, strain, excess over elastic limits, Pa, and joint index, (S, 4)."""
-        springs, bricks = self._network.springs, fields.brick_twist.shape[1]
-        acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
-        joints = fields.joint_wrench[:, :acting]  # others bear nothing
-        wrench = joints.reshape(*joints.shape[:2], 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
-        stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
-        given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
-        shift, turn = lengths(given).transpose(2, 0, 1)
-        turned = np.hstack([turn, lengths(fields.brick_twist[..., 3:])]).max(axis=1)
-        if self._limits is None:
-            strain, none = shift / self._thickness[:acting], np.zeros(len(turned))
-            return np.column_stack([turned, strain.max(axis=1), none - np.inf, none])
-        assembly = self._limits.assembly
-        corners = int(np.searchsorted(assembly.contact, acting))
-        face = assembly.contact[:corners]
-        lever = lengths(assembly.corner[:corners] - springs.position[face])
-        strain = (shift[:, face] + turn[:, face] * lever) / self._thickness[face]
-        excess = self._limits.excess(joints)
-        most = excess.max(axis=1, keepdims=True)
-        first = np.isclose(excess, most, rtol=1e-9, atol=0.0).argmax(axis=1)  # of those that tie
-        return np.column_stack([turned, strain.max(axis=1), most[:, 0], first])
-
-
-def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
-    """Describe the builds that exceed the linear range, and their limits: one line, or none.
-
-    Examples
-    --------
-    >>> builds_in_words({"a": [Departure("rotation", "1 rad, more than 0.1 rad", (3,))], "b": ()})
-    ('a (rotation)',)
-    """
-    left = [name for name, each in departures.items() if each]
-    what = dict.fromkeys(one.what for each in departures.values() for one in each)
-    return (f"{', '.join(left)} ({', '.join(what)})",) if left else ()
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
@@ -272,13 +117,9 @@ def _table_of(columns: _Columns) -> pd.DataFrame:
 
 
 def held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
-    """Return the bricks and grips of every step of a table of `analyze`."""
-    nodes = zip(*(table[f"{robot.name}_node"] for robot in scene.robots), strict=True)
-    bricks = [int(count) for count in table["bricks"]]
-    held = (
-        scene.grip_numbers([_node(n) for n in row], b) for row, b in zip(nodes, bricks, strict=True)
-    )
-    return [*zip(map(int, table["step"]), bricks, held, strict=True)]
+    """Return number, bricks and grips of every step of a table of `analyze`."""
+    steps = _steps_in_table(scene, table)
+    return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
 
 
 def _steps_in_table(scene: Scene, table: _Columns) -> list[Step]:
@@ -441,6 +282,164 @@ def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) ->
         }
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+_MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
+_TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
+_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
+OUTSIDE = "outside the linear range"
+FAR_OFF = "displacement"
+REMEDY = (
+    "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
+    "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
+    "Where only stress is too large, the engine discrete lets joints open and break."
+)
+
+
+@dataclass(frozen=True)
+class Departure:
+    """A limit of the linear range that some steps exceed."""
+
+    what: str  # what is too large, in a word or two
+    said: str  # the largest value, the limit, and why it is one
+    steps: tuple[int, ...]  # numbers of the steps
+
+    def __str__(self) -> str:
+        return f"{self.what} of up to {self.said} ({_steps_in_words(self.steps)})"
+
+
+class LinearRange:
+    """Checks the steps of builds against the linear range of an engine.
+
+    ``mortar``: with the elastic limits of joints; ``unchecked``: why stresses in joints are not
+    checked, or empty; ``far``: the limit of displacements, m; ``offs``: cached tolerances, m.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self._network = engine, engine.network
+        self._breaks = isinstance(engine, AutoEngine | OpeningEngine)
+        self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
+        self.far = linear_limit(engine.network.scene)
+        self._known: dict[_Key, Floats] = {}
+        self.offs: dict[_Key, float] = {}
+        thickness = engine.network.springs.thickness
+        self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
+        self.unchecked: tuple[str, ...] = ()
+        chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
+        self.mortar = EPOXY if chooser is None else chooser.mortar
+        self._limits = None if chooser is None else chooser.limits
+        try:
+            if self._limits is None and not self._breaks:
+                self._limits = find_elastic_limits(engine.network, self.mortar)
+        except SceneError as error:
+            self.unchecked = (f"stresses in joints are not checked: {error}",)
+
+    def departures(self, table: _Columns) -> tuple[Departure, ...]:
+        """Return the limits that the steps of a build exceed, by their table of `seqopt.analyze`.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> from seqopt.responses.table import LinearRange
+        >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+        >>> table = seqopt.analyze(engine, seqopt.sequential(engine.network))
+        >>> LinearRange(engine).departures(table)
+        ()
+        """
+        shift, far = RESPONSES["D_max"], self.far
+        moved = np.asarray(table[shift.column], dtype=float) / shift.scale
+        turned, strained, stressed = self._measured(table)[:, :3].T
+        stressed = np.where(self._breaks, -np.inf, stressed)
+        steps = np.asarray(table["step"], dtype=int)
+        within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
+        deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
+        mortar = self.mortar
+        strength = (
+            f"{{:.3g}} MPa beyond what {_mortar_name(mortar)} holds, "
+            f"{mortar.tensile_strength / 1e6:g} MPa in tension, {mortar.cohesion / 1e6:g} MPa and "
+            "friction in shear"
+        ).format
+        found = (
+            (FAR_OFF, moved, far, lambda most: length_text(most) + within),
+            ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
+            ("deformation of a joint", strained, _STRAIN, deformed),
+            ("stress in a joint", stressed, 0.0, lambda most: strength(most / 1e6)),
+        )
+        return tuple(
+            Departure(what, say(float(values[over].max())), tuple(steps[over].tolist()))
+            for what, values, most, say in found
+            if (over := ~(values <= most)).any()  # what is not a number is not within
+        )
+
+    def seen(self, step: Step, fields: Fields) -> Fields:
+        """Return all fields of a step, and cache its measures."""
+        (found,) = self._of(fields)
+        if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
+            numbers = self._network.scene.grip_numbers(step.grips, step.bricks)
+            self._known[step.bricks, numbers] = found
+        return fields
+
+    def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
+        """Return the limits that builds exceed, for those that exceed any, by name."""
+        self._measured(*tables.values())
+        return {name: left for name, each in tables.items() if (left := self.departures(each))}
+
+    def closest(self, table: _Columns) -> tuple[float, str, int]:
+        """Return margin, Pa, name and step of the joint closest to its limits; NaN if unknown."""
+        excess, joint = self._measured(table)[:, 2:].T
+        at = int(excess.argmax())
+        if self._limits is None or not np.isfinite(excess[at]):
+            return np.nan, "", 0
+        name = self._limits.assembly.contact_name[int(joint[at])]
+        return -float(excess[at]), f"joint {name}", int(np.asarray(table["step"])[at])
+
+    def _measured(self, *tables: _Columns) -> Floats:
+        """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
+        every = [held_in_table(self._network.scene, table) for table in tables]
+        keys = [(bricks, held) for _, bricks, held in chain.from_iterable(every)]
+        if isinstance(self._engine, OpeningEngine):
+            return np.full((len(keys), 4), -np.inf)  # far motions are unstable
+        new = [key for key in keys if key not in self._known]
+        self._known |= {key: np.array([0.0, 0.0, -np.inf, 0.0]) for key in new if not key[0]}
+        for alike, fields in _solved_alike(self._engine, new, _MEASURED):
+            self._known.update(zip(alike, self._of(fields), strict=True))
+        return np.array([self._known[key] for key in keys])
+
+    def _of(self, fields: Fields) -> Floats:
+        """Return rotation, rad, strain, excess over elastic limits, Pa, and joint index, (S, 4)."""
+        springs, bricks = self._network.springs, fields.brick_twist.shape[1]
+        acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
+        joints = fields.joint_wrench[:, :acting]  # others bear nothing
+        wrench = joints.reshape(*joints.shape[:2], 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
+        stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
+        given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
+        shift, turn = lengths(given).transpose(2, 0, 1)
+        turned = np.hstack([turn, lengths(fields.brick_twist[..., 3:])]).max(axis=1)
+        if self._limits is None:
+            strain, none = shift / self._thickness[:acting], np.zeros(len(turned))
+            return np.column_stack([turned, strain.max(axis=1), none - np.inf, none])
+        assembly = self._limits.assembly
+        corners = int(np.searchsorted(assembly.contact, acting))
+        face = assembly.contact[:corners]
+        lever = lengths(assembly.corner[:corners] - springs.position[face])
+        strain = (shift[:, face] + turn[:, face] * lever) / self._thickness[face]
+        excess = self._limits.excess(joints)
+        most = excess.max(axis=1, keepdims=True)
+        first = np.isclose(excess, most, rtol=1e-9, atol=0.0).argmax(axis=1)  # of those that tie
+        return np.column_stack([turned, strain.max(axis=1), most[:, 0], first])
+
+
+def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
+    """Describe the builds that exceed the linear range, and their limits: one line, or none.
+
+    Examples
+    --------
+    >>> builds_in_words({"a": [Departure("rotation", "1 rad, more than 0.1 rad", (3,))], "b": ()})
+    ('a (rotation)',)
+    """
+    left = [name for name, each in departures.items() if each]
+    what = dict.fromkeys(one.what for each in departures.values() for one in each)
+    return (f"{', '.join(left)} ({', '.join(what)})",) if left else ()
 
 
 _FEW = 100  # bricks up to which tolerances take less than a second

@@ -32,7 +32,7 @@ from seqopt.stability.assessment import (
     MARGINS,
     Stability,
     Verdict,
-    _first_to_fail,
+    _failure,
     _verdict_of,
     assess,
     bonded,
@@ -259,18 +259,10 @@ def each_verdict(
 
 def _proven_state(assembly: Assembly, proven: Proven, way: Way) -> Stability:
     """Return what a chain proves of a partial structure."""
-    verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
-    if verdict is Verdict.FALLS:
-        motion = proven.answer.motion / np.abs(proven.answer.motion).max()
-    block, contact = _first_to_fail(assembly, motion)
-    return Stability(
-        verdict,
-        proof=way.value,
-        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
-        first_block=block,
-        first_contact=contact,
-        unproven=int(verdict is Verdict.UNDECIDED),
-    )
+    verdict, still = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+    failure = _failure(assembly, proven.answer.motion if verdict is Verdict.FALLS else still)
+    unproven = int(verdict is Verdict.UNDECIDED)
+    return Stability(verdict, proof=way.value, unproven=unproven, **failure)
 
 
 _NOTHING = Stability(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -164,8 +165,6 @@ def assess(
     failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
     known = failure.value < CAP if pulls else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
-    motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
-    block, contact = _first_to_fail(assembly, motion)
     friction = _least_friction(prove, mortar) if "friction" in margins else np.nan
     bond = np.nan
     if "bond" in margins:
@@ -184,12 +183,10 @@ def assess(
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
         grip=grip,
-        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
-        first_block=block,
-        first_contact=contact,
         jammed=_is_jammed(prove, mortar, friction) if "friction" in margins and stands else None,
         claims=dict(prove.claims),
         unproven=prove.unproven,
+        **_failure(assembly, motion),
     )
 
 
@@ -222,17 +219,18 @@ def _verdict_of(stand: Proven) -> Verdict:
     return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
 
 
-def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return the fastest block and the contact that parts fastest in a motion (B, 6), or empty."""
-    speed = np.linalg.norm(motion, axis=1)
-    if not speed.max(initial=0.0) > 0:
-        return "", ""
-    block = str(assembly.block_name[int(speed.argmax())])
-    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
-    apart = np.linalg.norm(parting, axis=1)
-    if not apart.max(initial=0.0) > _STILL:
-        return block, ""
-    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
+def _failure(assembly: Assembly, motion: Floats) -> dict[str, Any]:
+    """Return `Stability.motion` of a motion (B, 6), and what is fastest in it; empty if none is."""
+    motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
+    speed, block, contact = np.linalg.norm(motion, axis=1), "", ""
+    if speed.max(initial=0.0) > 0:
+        block = str(assembly.block_name[int(speed.argmax())])
+        parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+        apart = np.linalg.norm(parting, axis=1)
+        if apart.max(initial=0.0) > _STILL:
+            contact = assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
+    motion = motion / np.repeat([1.0, assembly.scales[1]], 3)
+    return {"motion": motion, "first_block": block, "first_contact": contact}
 
 
 def _least_friction(prove: Prover, mortar: Mortar) -> float:
@@ -349,11 +347,8 @@ def load_factor(assembly: Assembly, mortar: Mortar) -> LoadFactor:
         helps = bool(size) and float(scaled.applied_load @ bare.answer.motion.ravel()) < 0
         if not helps or found.answer.claim is Claim.INFEASIBLE:
             values, motion = (0.0, np.nan if helps else 0.0), bare.answer.motion
-    motion = motion / (np.abs(motion).max() or 1.0)
-    first = _first_to_fail(assembly, motion)
-    motion = motion / np.repeat([1.0, assembly.scales[1]], 3)
     factor, most = (np.inf if z >= _ENDLESS else z / (size or 1.0) for z in values)
-    return LoadFactor(factor, most, unloaded, force, motion, *first)
+    return LoadFactor(factor, most, unloaded, force, **_failure(assembly, motion))
 
 
 def load_factors(

@@ -39,6 +39,9 @@ from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.limit_analysis import horizontal
 from seqopt.work.progress import Tell, with_progress
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 _SMALL = 0.1  # of a brick's smallest side: ground that turns and shifts no more changes no balance
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
@@ -206,9 +209,6 @@ def _settlement_said(scene: Scene) -> str:
         "their balance as it is; where it opens joints, ask: analyze --engine discrete"
     )
 
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
 _TILTED = 8  # directions, evenly spread
