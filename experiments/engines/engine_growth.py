@@ -38,7 +38,7 @@ from experiments.harness.scenes import scene_named
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.report._style import GRAY, dress, looks, plain, styled
-from seqopt.responses._grip_sets import Resources
+from seqopt.responses import Resources
 from seqopt.sequence.steps import Step
 from seqopt.study.published import EQUATIONS
 

@@ -23,6 +23,8 @@ from seqopt.scene.shape import clip, polygon_moments
 
 _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
 _BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
+_SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
+_KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
 
 
 def _require_touching(
@@ -56,9 +58,6 @@ def _face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     outward = -np.sign(frame[i] @ normal) * frame[i]
     face = np.array(brick.position) + 0.5 * brick.dimensions[i] * outward
     return float((face - point) @ outward / (normal @ outward))
-
-
-_SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 def _contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
@@ -234,9 +233,6 @@ def _grip_fields(network: Network, bricks: int, grips: Sequence[int | None]) -> 
         "applied": _applied_rows(network, bricks, props),
         "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
     }
-
-
-_KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
 
 
 class PartialAssemblies:

@@ -1,4 +1,9 @@
-"""Mortars: what a joint carries besides compression, and the share of its bond at an age."""
+"""Mortars: what a joint carries besides compression, its share at an age, and its elastic limits.
+
+Elastic limits say whether the stress in joints is less than the strength of their mortar: the
+wrench of a joint is distributed linearly over its face, force over area and moment over second
+moment, and checked at the corners, where the stress is largest.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +23,15 @@ from seqopt.network._mechanics import point_motion
 from seqopt.network.network import Network
 from seqopt.scene._checks import check, finite, not_negative, positive, rows, settle, short
 from seqopt.scene.shape import fans
+
+SHARES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""The shares of full bond at which a bond that grows in proportion to its age is counted."""
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+EXAMPLE = "15min, or 5min=0.4,15min=1"
+Points = tuple[tuple[float, float], ...]
+_CUTS = 2  # times that each triangle of a face is cut into four
+_STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+_CHUNK = 1_000_000  # corners of sets whose stress is held at once
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,13 +137,6 @@ def _with_mortar(name: str) -> str:
     return name if name.partition(",")[0] == "dry" else f"with {name}"
 
 
-SHARES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""The shares of full bond at which a bond that grows in proportion to its age is counted."""
-_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-EXAMPLE = "15min, or 5min=0.4,15min=1"
-Points = tuple[tuple[float, float], ...]
-
-
 @dataclass(frozen=True, repr=False)
 class Curing(Terse):
     """The share of its full bond that a joint has at an age: what was reached last, never more.
@@ -217,9 +224,6 @@ class BedStiffness:
         check(self, "bed", normal=each, tangential=each)
 
 
-_CUTS = 2  # times that each triangle of a face is cut into four
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class _Quadrature(FrozenValue):
     """Points that stand for faces; a face is a contact of an assembly."""
@@ -265,10 +269,6 @@ def quadrature_stiffness(bed: _Quadrature, maps: Floats, moduli: Floats) -> Floa
     each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
     firsts = np.searchsorted(bed.face, np.arange(len(moduli)))  # faces of points ascend
     return np.asarray(np.add.reduceat(each, firsts, axis=0))
-
-
-_STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
-_CHUNK = 1_000_000  # corners of sets whose stress is held at once
 
 
 @dataclass(frozen=True, eq=False, repr=False)

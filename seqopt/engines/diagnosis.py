@@ -44,6 +44,9 @@ UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
 _LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
 _SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 _EIGENVALUE_TOLERANCE = 1e-6  # relative
+_Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
+_LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
+WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
 
 
 def _spectrum(
@@ -191,9 +194,6 @@ def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Fl
     return np.maximum([heavy, heavy * longest], tiny), max(moved, tiny)
 
 
-_Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
-
-
 def _ground_motion(network: Network) -> Floats:
     """Return how the ground moves at every spring, (S, 6)."""
     out = np.zeros((len(network.springs.since), 6))
@@ -239,10 +239,6 @@ def _balance(center: Floats, pulls: list[_Pull]) -> tuple[Floats, Floats]:
         np.add.at(total, body, wrench + turn)
         np.add.at(size, body, np.abs(wrench) + np.abs(turn))
     return total, size
-
-
-_LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
-WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
 
 
 class Finding(Enum):

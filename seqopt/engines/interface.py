@@ -26,6 +26,9 @@ from seqopt.network.network import Network
 from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
 
+FAR = 0.1  # motion over a brick's length beyond which a structure has gone
+_RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
+
 
 class Want(Flag):
     """Which fields are computed; grip forces always are."""
@@ -77,9 +80,6 @@ class Fields(FrozenValue):
         if self.grip_moment is None:
             settle(self, grip_moment=np.zeros_like(self.grip_force))
         super().__post_init__()
-
-
-FAR = 0.1  # motion over a brick's length beyond which a structure has gone
 
 
 def linear_limit(scene: Scene) -> float:
@@ -327,9 +327,6 @@ def _in_place(network: Network, grips: Ints) -> GripCompliance:
     one = len(matrix) == 1
     every = np.broadcast_to(matrix[0], (*grips.shape, *matrix.shape[1:])) if one else matrix[kind]
     return GripCompliance(None, every, network.lever)
-
-
-_RIGID = 1e-9  # compliance in a direction, over the largest, that stands for none
 
 
 class _GripSpring(NamedTuple):

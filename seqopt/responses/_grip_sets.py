@@ -1,6 +1,8 @@
 """Responses of grip sets, computed on demand and cached.
 
-For searches that need few of many sets: the sets of a request are solved in batches, each once.
+For searches that need few of many sets: the sets of a request are solved in blocks, each once. The
+size of blocks depends on the schedule alone, so that responses are bitwise equal in any process.
+Other processes receive the scene, and build the engine themselves.
 """
 
 from __future__ import annotations
@@ -37,6 +39,13 @@ from seqopt.sequence.steps import Step
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Progress, Tell
+
+COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
+# Engines of the last two runs of each thread of a worker: executors of users have no storage for
+# workers' data between tasks, each of which would build its engine again.
+_OF_THREAD = threading.local()
+BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
+BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 @dataclass(frozen=True)
@@ -102,9 +111,6 @@ class Block(FrozenValue):
         return work(len(self.grips), self.bricks)
 
 
-COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
-
-
 def work(states: int, bricks: int) -> float:
     """Return the estimated work of states, without unit."""
     return float(states * (bricks + 20))  # 20: what every state costs, however small it is
@@ -156,11 +162,6 @@ def packed(engine: Engine) -> bytes:
         ) from error
 
 
-# Engines of the last two runs of each thread of a worker: executors of users have no storage for
-# workers' data between tasks, each of which would build its engine again.
-_OF_THREAD = threading.local()
-
-
 def unpacked(engine: Engine | bytes) -> Engine:
     """Return an engine unchanged, or the one of a `packed` form, built once for a thread."""
     if not isinstance(engine, bytes):
@@ -172,9 +173,6 @@ def unpacked(engine: Engine | bytes) -> Engine:
         if len(made) > 2:
             del made[next(iter(made))]
     return made[engine]
-
-
-BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
 
 
 class KnownRows:
@@ -377,9 +375,6 @@ def most_moved(engine: Engine, steps: Sequence[Step]) -> Moved:
         at = int(shift.argmax())
         found.append(Moved(float(shift[at]) / far, [*numbers.values()][at]))
     return max(found, key=lambda moved: moved.share)
-
-
-BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 def _near(values: Floats, bound: Floats | float) -> Bools:

@@ -23,6 +23,19 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 _LISTED = 12  # steps that are named one by one
+TOLERANCE = "tolerance"
+"""A response like others, but that more is better: how far every grip may be off before a robot
+carries more than its payload, or a limit is exceeded. Counted by its reciprocal, 1/m."""
+NO_TOLERANCE = 1e30  # its reciprocal where there is none
+PROP_EXCESS = "prop_excess"
+"""A response that is there where a scene has props: by how much the force of any is more than it
+may be, N: beyond its capacity, or a pull of one that only pushes."""
+_SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
+_LEVEL = 1e-9  # share of a force that may point down where it counts as level
+TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
+_TAKEN = {"rob", "prop", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+_MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+EXCESS_COLUMN = "prop_excess_N"
 
 
 def _number_text(value: float) -> str:
@@ -86,21 +99,6 @@ def _steps_in_words(steps: Sequence[int]) -> str:
     return f"step{'s' * (len(steps) > 1)} {', '.join(map(str, steps[:_LISTED]))}{more}"
 
 
-TOLERANCE = "tolerance"
-"""A response like others, but that more is better: how far every grip may be off before a robot
-carries more than its payload, or a limit is exceeded. Counted by its reciprocal, 1/m."""
-NO_TOLERANCE = 1e30  # its reciprocal where there is none
-
-PROP_EXCESS = "prop_excess"
-"""A response that is there where a scene has props: by how much the force of any is more than it
-may be, N: beyond its capacity, or a pull of one that only pushes."""
-
-
-_SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
-_LEVEL = 1e-9  # share of a force that may point down where it counts as level
-TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
-
-
 @dataclass(frozen=True)
 class Response:
     """A scalar response of a partial structure to its weight and its grips.
@@ -130,10 +128,6 @@ def lengths(vectors: Floats) -> Floats:
     """Return the lengths (...) of vectors (..., 3)."""
     x, y, z = (vectors[..., i] for i in range(3))  # adding whole arrays outruns sums of three
     return np.asarray(np.sqrt(x * x + y * y + z * z))
-
-
-_TAKEN = {"rob", "prop", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
-_MARKS = set("[]=,;")  # of the language of criteria, limits and tables
 
 
 def robot_response(robot: str) -> str:
@@ -261,9 +255,6 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
     """
     found = {name: response.of(network, fields) for name, response in RESPONSES.items()}
     return {"F_rob": grip_forces(network, fields), **found}
-
-
-EXCESS_COLUMN = "prop_excess_N"
 
 
 def _excess_of(props: Sequence[Prop], force: Floats) -> Floats:

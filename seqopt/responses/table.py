@@ -57,6 +57,18 @@ _Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
 _Key = tuple[int, tuple[int, ...]]  # bricks that stand, and what is held
 _Held = tuple[int, int, tuple[int, ...]]
 """Number of a step, its bricks, and what is held."""
+_MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
+_TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
+_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
+OUTSIDE = "outside the linear range"
+FAR_OFF = "displacement"
+REMEDY = (
+    "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
+    "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
+    "Where only stress is too large, the engine discrete lets joints open and break."
+)
+_FEW = 100  # bricks up to which tolerances take less than a second
+_KNOWN = AutoEngine, ComplianceEngine, OpeningEngine
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
@@ -284,18 +296,6 @@ def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) ->
     return pd.DataFrame(rows)
 
 
-_MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
-_TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
-_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
-OUTSIDE = "outside the linear range"
-FAR_OFF = "displacement"
-REMEDY = (
-    "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
-    "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
-    "Where only stress is too large, the engine discrete lets joints open and break."
-)
-
-
 @dataclass(frozen=True)
 class Departure:
     """A limit of the linear range that some steps exceed."""
@@ -440,10 +440,6 @@ def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str,
     left = [name for name, each in departures.items() if each]
     what = dict.fromkeys(one.what for each in departures.values() for one in each)
     return (f"{', '.join(left)} ({', '.join(what)})",) if left else ()
-
-
-_FEW = 100  # bricks up to which tolerances take less than a second
-_KNOWN = AutoEngine, ComplianceEngine, OpeningEngine
 
 
 @dataclass(frozen=True, repr=False)

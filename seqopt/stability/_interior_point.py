@@ -32,6 +32,15 @@ from seqopt.stability.limit_analysis import Answer, Case, Claim, limits
 _REGULAR = 1e-13  # of the largest entry, added to all on the diagonal: blocks may be loose
 
 Solve = Callable[[Floats], Floats]
+FLIP = np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+_MIRROR = np.diag(FLIP[:, 0])[:, :, None]
+_ROUNDED = 1e-12  # share of a square by which a difference may be negative from rounding
+_FARTHEST = 1e3  # share of a step that counts as no limit
+ROUNDS = 25  # at most; most structures need two to eight
+_SHARE = 0.95  # of the way to the edge of the cones that is gone in a round
+_STUCK = 1e-3  # share of a step so small that further rounds lead nowhere
+_DONE = 1e-8  # t that counts as none, over the force scale
+_ROOM = 0.1  # by which t starts above what the first forces need, over the force scale
 
 
 class Balance:
@@ -85,12 +94,6 @@ class Balance:
             return out
 
         return solution
-
-
-FLIP = np.array([[1.0], [-1.0], [-1.0], [-1.0]])
-_MIRROR = np.diag(FLIP[:, 0])[:, :, None]
-_ROUNDED = 1e-12  # share of a square by which a difference may be negative from rounding
-_FARTHEST = 1e3  # share of a step that counts as no limit
 
 
 class Cones:
@@ -170,13 +173,6 @@ def apply(matrices: Floats, vectors: Floats) -> Floats:
 def times(first: Floats, second: Floats) -> Floats:
     """Return products (n, k, C) of matrices (n, m, C) and (m, k, C)."""
     return np.asarray(np.einsum("ijc,jkc->ikc", first, second))
-
-
-ROUNDS = 25  # at most; most structures need two to eight
-_SHARE = 0.95  # of the way to the edge of the cones that is gone in a round
-_STUCK = 1e-3  # share of a step so small that further rounds lead nowhere
-_DONE = 1e-8  # t that counts as none, over the force scale
-_ROOM = 0.1  # by which t starts above what the first forces need, over the force scale
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,11 @@
 """Which grip sets of a partial structure stand, with what margins: most without a solver.
 
 A set stands if forces are found that hold it, and falls if a motion is found in which it falls:
-either is checked by the structure's own data (`seqopt.stability._screens`), with the friction
-cone and the payloads as they are. What one set proves decides many others, so that a linear
-program, whose cones are inscribed polyhedra, is solved for few of them.
+either is checked by the structure's own data, with the friction cone and the payloads as they are.
+What one set proves decides others: forces that hold a structure hold it with more grips, larger
+payloads, or without a grip that they leave idle; a motion in which it falls makes it fall with any
+grips whose payloads can take up less work than the loads do in it. So a linear program, whose cones
+are inscribed polyhedra, is solved for few sets.
 
 The sideways pulls that a structure survives are a convex set. What is between pulls that it
 survives, it survives, so the least distance of their hull from no pull is survived in every
@@ -62,16 +64,23 @@ Where no forces exist, the answer claims that, has no value and a motion that sa
 
 CompileHeld = Callable[[Assembly, Case], HeldProgram]
 """Makes the program of an assembly, whose grips are all that may ever be held, and a case."""
+_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
+_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
+_Settled = Callable[[Floats], Bools]
+"""Says which brackets (S, 2) are narrow enough."""
+STANDS, FALLS, OPEN = 1, -1, 0
+_FIRST = tuple(range(0, FINE, FINE // 4))
+_FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
+_TURN = 2 * np.pi / FINE
+_ANGLES: Floats = _TURN * np.arange(FINE, dtype=float)
+Part = tuple[int, bool]  # how many bricks stand, and whether the props hold that could
+_Cases = Callable[[Assembly], list[Case]]
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     """Return the registered linear program (entry points ``seqopt.limit_analysis``)."""
     compiled: CompileHeld = plugins("seqopt.limit_analysis")["lp"].load()
     return compiled(assembly, case)
-
-
-_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
-_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
 class _FallingMotion(NamedTuple):
@@ -171,10 +180,6 @@ class _Known:
         return np.where(growth > 0, value, CAP)
 
 
-_Settled = Callable[[Floats], Bools]
-"""Says which brackets (S, 2) are narrow enough."""
-
-
 def node_assembly(network: Network, bricks: int, *, held: bool = True) -> Assembly:
     """Return a partial structure with a grip without payload at every inner node.
 
@@ -267,15 +272,6 @@ class HeldStates:
             if settled(new.learn(answer, held).bracket(places, payload))[0]:
                 break
         return new
-
-
-STANDS, FALLS, OPEN = 1, -1, 0
-_FIRST = tuple(range(0, FINE, FINE // 4))
-_FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
-_TURN = 2 * np.pi / FINE
-_ANGLES: Floats = _TURN * np.arange(FINE, dtype=float)
-
-Part = tuple[int, bool]  # how many bricks stand, and whether the props hold that could
 
 
 class TiltedStates:
@@ -505,9 +501,6 @@ def held_parts(
         if len(rows):
             sets = np.hstack([places[rows], at.astype(np.int64)])
             yield rows, (bricks, propped), sets, np.hstack([loads[rows], most])
-
-
-_Cases = Callable[[Assembly], list[Case]]
 
 
 class Margins:

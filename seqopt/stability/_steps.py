@@ -1,4 +1,9 @@
-"""Whether the steps of a build stand, and by how much: as a table too."""
+"""Whether the steps of a build stand, and by how much: as a table too.
+
+What proves one step is tried on the next. Every answer of a solver is a claim: forces hold a step
+by `seqopt.stability.limit_analysis.violation` alone, and a motion makes it fall by `bound` alone.
+What is left open is solved as a cone program.
+"""
 
 from __future__ import annotations
 
@@ -59,6 +64,28 @@ _CLEAR = 10 * EXACT  # least bound of a motion that is
 _KEPT = 8  # answers that are tried on steps with more grips
 _NEAR = 0.7  # share of all blocks up to which those near what fell take less than all
 _MOVES = 1e-2  # of the largest motion, over which a block falls
+Parts = Callable[[int, Grips], Assembly]
+"""Gives partial structures with their grips, as `PartialAssemblies`."""
+_CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
+_LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
+_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[Stability]]
+_NOTHING = Stability(
+    Verdict.STANDS,
+    proof="nothing stands",
+    bond=0.0,
+    friction=0.0,
+    pull=np.full(DIRECTIONS, np.inf),
+    tilt=np.pi / 2,
+    grip=0.0,
+)  # of the empty site, where a take-down ends
+_unpickled = lru_cache(maxsize=1)(pickle.loads)  # what a worker is sent, the same for all chunks
+_TILT = "tilt_survived_deg"
+_MARGINS = (
+    ("bond_needed_Pa", "bond", "needs {} kPa at most", 1e-3),
+    ("friction_needed", "friction", "needs {} at most", 1.0),
+    (_TILT, "tilt", "survives {}° at least", 1.0),
+    ("largest_grip_force_N", "grip force", "needs {} N at most", 1.0),
+)  # in `stability_table`
 
 
 class Way(Enum):
@@ -69,10 +96,6 @@ class Way(Enum):
     MOTION = "motion"
     EARLIER_MOTION = "earlier motion"
     CONES = "cone program"
-
-
-Parts = Callable[[int, Grips], Assembly]
-"""Gives partial structures with their grips, as `PartialAssemblies`."""
 
 
 def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
@@ -218,13 +241,6 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
     return pd.DataFrame([stability_row(step, result) for step, result in each])
 
 
-_CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
-_LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
-
-
-_Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[Stability]]
-
-
 def parts_of(built: Network | PartialAssemblies, steps: Sequence[Step]) -> PartialAssemblies:
     """Return the partial structures of steps, those given or cut from as large a whole."""
     most = max((step.bricks for step in steps), default=1) or 1
@@ -263,17 +279,6 @@ def _proven_state(assembly: Assembly, proven: Proven, way: Way) -> Stability:
     failure = _failure(assembly, proven.answer.motion if verdict is Verdict.FALLS else still)
     unproven = int(verdict is Verdict.UNDECIDED)
     return Stability(verdict, proof=way.value, unproven=unproven, **failure)
-
-
-_NOTHING = Stability(
-    Verdict.STANDS,
-    proof="nothing stands",
-    bond=0.0,
-    friction=0.0,
-    pull=np.full(DIRECTIONS, np.inf),
-    tilt=np.pi / 2,
-    grip=0.0,
-)  # of the empty site, where a take-down ends
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
@@ -320,9 +325,6 @@ def _in_worker(parts: bytes, find: _Find, steps: Sequence[Step]) -> tuple[Stabil
     return tuple(find(_unpickled(parts), steps))
 
 
-_unpickled = lru_cache(maxsize=1)(pickle.loads)  # what a worker is sent, the same for all chunks
-
-
 def _each(
     parts: PartialAssemblies,
     steps: Sequence[Step],
@@ -341,7 +343,7 @@ def _each(
 
 
 def stability_row(step: Step, result: Stability) -> dict[str, object]:
-    """Return the row of a step in `seqopt.stability._steps.stability_table`."""
+    """Return the row of a step in `stability_table`."""
     return {
         "step": step.number,
         "type": step.kind.value,
@@ -359,15 +361,6 @@ def stability_row(step: Step, result: Stability) -> dict[str, object]:
         "stalled": result.claims.get(Claim.STALLED, 0),
         "unproven": result.unproven,
     }
-
-
-_TILT = "tilt_survived_deg"
-_MARGINS = (
-    ("bond_needed_Pa", "bond", "needs {} kPa at most", 1e-3),
-    ("friction_needed", "friction", "needs {} at most", 1.0),
-    (_TILT, "tilt", "survives {}° at least", 1.0),
-    ("largest_grip_force_N", "grip force", "needs {} N at most", 1.0),
-)  # in the table of `seqopt.stability._steps.stability_table`
 
 
 def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:

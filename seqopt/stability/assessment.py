@@ -47,6 +47,7 @@ _STILL = 1e-6  # motion slower than this, beside the fastest, is none
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 _LITTLE = 1e-3  # friction that holds nothing but what is jammed
 _FRICTION_STEP = 1e-4  # to which the least one is found
+_ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
 
 
 class Verdict(Enum):
@@ -281,9 +282,6 @@ def _is_jammed(prove: Prover, mortar: Mortar, least: float) -> bool:
 def _amount(value: float) -> float:
     """Return a proven z, zero where it is no more than what proofs leave open."""
     return 0.0 if value <= EXACT else value
-
-
-_ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
 
 
 @dataclass(frozen=True, eq=False, repr=False)

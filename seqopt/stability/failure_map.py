@@ -47,6 +47,11 @@ _SMALL = 0.1  # of a brick's smallest side: ground that turns and shifts no more
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
+AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
+_TILTED = 8  # directions, evenly spread
+_SURE = 1e-3  # share by which more is taken than a step is proven to need
+_TRIED = 24  # nodes where one more grip is tried, the fastest ones first
+_HINGE = 0.5  # share of the opening that turning brings about, from which on it is a turn
 
 
 @dataclass(frozen=True, repr=False)
@@ -208,13 +213,6 @@ def _settlement_said(scene: Scene) -> str:
         f"{ends} enters no verdict: rigid bricks follow it without strain, and one so small leaves "
         "their balance as it is; where it opens joints, ask: analyze --engine discrete"
     )
-
-
-AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
-_TILTED = 8  # directions, evenly spread
-_SURE = 1e-3  # share by which more is taken than a step is proven to need
-_TRIED = 24  # nodes where one more grip is tried, the fastest ones first
-_HINGE = 0.5  # share of the opening that turning brings about, from which on it is a turn
 
 
 @dataclass(frozen=True, eq=False, repr=False)

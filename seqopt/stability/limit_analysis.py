@@ -11,6 +11,9 @@ Forces that satisfy this prove one side. A motion of the blocks proves the other
 closes or slides without opening m times as fast, the load must not do more work than the contacts
 and robots can take up (the kinematic theorem of limit analysis). Both are evaluated here, from
 the assembly's own data; a solver's status is never the verdict.
+
+The pulls sideways that are survived form a convex set: forces for two pulls mix to forces for what
+lies between them. So what is survived in a few directions bounds from below what is in all others.
 """
 
 from __future__ import annotations
@@ -32,6 +35,12 @@ ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of 
 LARGEST_FORCE = 10.0  # of a corner, over all loads and payloads: weight of motions that violate
 _CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
 CAP = 1e5  # z is sought between 0 and this
+_HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
+DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
+FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
+_ROUNDED = 1e-9  # share of half a turn that is rounding
+_MORE = 8  # directions at most that are added where the bound for all others is least
+NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
 
 class Sense(Enum):
@@ -209,9 +218,6 @@ def contact_work(
     return taken, opening
 
 
-_HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Proven(FrozenValue):
     """A number with its two proofs.
@@ -279,13 +285,6 @@ class Prover:
         self.claims[answer.claim] += 1
         known = is_finite(helped, answer)
         return replace(answer, value=bound(helped, strongest, answer) if known else np.nan)
-
-
-DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
-FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
-_ROUNDED = 1e-9  # share of half a turn that is rounding
-_MORE = 8  # directions at most that are added where the bound for all others is least
-NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
 
 def sideways(fixed: Case, up: Vector, count: int = DIRECTIONS) -> list[Case]:

@@ -24,7 +24,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
 from seqopt.problem.standing import Standing, slack
-from seqopt.responses._grip_sets import Resources
+from seqopt.responses import Resources
 from seqopt.sequence.rules import FreeRules
 from seqopt.work.progress import Stage
 from tests.builders import small_arch

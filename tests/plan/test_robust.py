@@ -21,7 +21,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation
 from seqopt.plan._answers import find_path
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
-from seqopt.responses._grip_sets import Resources
+from seqopt.responses import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch
 

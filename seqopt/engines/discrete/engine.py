@@ -45,6 +45,16 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
 _EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
+_BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+_ITERATIONS = 60
+_BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
+_ROUNDING = 1e-13  # relative
+_HIDDEN = 1e-4  # of the heaviest body's weight, that rounding may leave: else nothing rests
+LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
+_FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
+_MOVES = 120  # against a resistance
+_HALVINGS = 4
+_LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,9 +99,6 @@ class _Points(FrozenValue):
         apart = broken & (force[:, 0] <= 0)
         force[apart], slope[apart] = 0.0, 0.0
         return force, slope
-
-
-_BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -197,17 +204,6 @@ def _diagonal(blocks: Floats) -> sparse.csr_array:
     """Return blocks (J, 6, 6) as one matrix; SciPy deprecates `block_diag` of dense blocks."""
     index = np.arange(len(blocks) + 1)
     return sparse.csr_array(sparse.bsr_array((blocks, index[:-1], index)))
-
-
-_ITERATIONS = 60
-_BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
-_ROUNDING = 1e-13  # relative
-_HIDDEN = 1e-4  # of the heaviest body's weight, that rounding may leave: else nothing rests
-LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
-_FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
-_MOVES = 120  # against a resistance
-_HALVINGS = 4
-_LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 
 class _Held:

@@ -38,6 +38,8 @@ from seqopt.engines.rigid._operator import (
 from seqopt.work._threads import cores, in_threads, one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
+_ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
+_Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 class Grown(NamedTuple):
@@ -188,11 +190,6 @@ def _solve_grips(grown: Grown, columns: Ints, across: Floats) -> tuple[Floats, F
     system[count] = -dead.reshape(sets, count).T
     brace(system[:count], pairs_of(across, columns), 3)
     return solve_positive(system)
-
-
-_ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
-
-_Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def _compiled(*freedom: str) -> Callable[[_Function], _Function]:

@@ -27,6 +27,15 @@ from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
 from seqopt.work._threads import cores, in_threads
 
+TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
+_AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+_LEAST = 4  # times as many, from which on one more thread pays
+_SUMMED = 2**22  # the same, where much is done with each, brick after brick
+_TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
+_WORSE = 10.0  # times the rounding that was left when they were summed anew
+_SAMPLE = 600  # motions that are compared with each other, about
+_MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpanningTree(FrozenValue):
@@ -56,16 +65,6 @@ def grow_tree(network: Network) -> SpanningTree:
         spring[b], parent[b] = best, springs.bodies[best, 0]
         depth[b] = depth[parent[b]] + 1
     return SpanningTree(spring, parent)
-
-
-TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
-_AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
-_LEAST = 4  # times as many, from which on one more thread pays
-_SUMMED = 2**22  # the same, where much is done with each, brick after brick
-_TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
-_WORSE = 10.0  # times the rounding that was left when they were summed anew
-_SAMPLE = 600  # motions that are compared with each other, about
-_MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
 
 
 class _Before(NamedTuple):

@@ -1,7 +1,8 @@
 r"""Rigid bricks solved with joint wrenches and motions as unknowns side by side.
 
-One factorization of the system per grip set, corrected until
-it no longer changes: slow, sure, and the last resort of the fast engine.
+One factorization of the system per grip set, corrected until it no longer changes: slow, sure, and
+the last resort of the fast engine. The part of the system that grip sets share (`Ungripped`) also
+says whether grips leave a structure a free motion (`require_resistance`).
 
 Stiffness form squares what separates a stiff joint from a soft chain. Kept apart, the deformations
 of the joints, the equilibrium of the bricks and the stillness of the grips make one sparse system
@@ -39,6 +40,13 @@ from seqopt.scene._checks import settle
 from seqopt.work._threads import one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
+_UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
+_CORRECTIONS = 6  # most of an answer; rounding in what is left does not spoil them
+_SENSITIVE = 1e-6  # largest change by last digits of the system; errors are a tenth of it or less
+_TRIES = 4  # ways in which last digits are changed
+_EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
+_LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
+_SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,9 +169,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         wrench_unit=unit * np.tile(lever, len(acting)),
         unit=unit,
     )
-
-
-_UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
 def free_motion(
@@ -431,13 +436,6 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
     return np.hstack([own / parts.wrench_unit, twist / parts.twist_unit])
 
 
-_CORRECTIONS = 6  # most of an answer; rounding in what is left does not spoil them
-_SENSITIVE = 1e-6  # largest change by last digits of the system; errors are a tenth of it or less
-_TRIES = 4  # ways in which last digits are changed
-_EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
-_LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
-
-
 def solve_mixed(
     network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
 ) -> Fields:
@@ -554,9 +552,6 @@ def sizes(parts: Ungripped, states: Floats) -> Floats:
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
     ways = [np.abs(part[:, way::6]).max(axis=1, initial=0.0) for part in both for way in range(6)]
     return np.asarray(np.stack(ways, axis=1).reshape(len(states), 4, 3).max(axis=2))
-
-
-_SPLIT = 2.0**27 + 1.0  # halves the 53 digits of a double
 
 
 def add_products(start: Floats, matrix: sparse.csr_array, factors: Floats) -> Floats:

@@ -1,6 +1,10 @@
 """The compliance operator: how one partial structure answers forces at its inner nodes.
 
-The operators of all brick counts come from what grows with the build.
+The operators of all brick counts come from what grows with the build. From one follow the equations
+of many grip sets at once: which forces hold the grips still. Two grips may share a brick: between
+them along it, rigid ones leave a force undetermined, which `share_pairs` gives to the node that it
+reaches. The compliance of compliant grips is added to the equations; where two that are nearly
+rigid share a brick, digits are lost (`nearly_rigid`).
 """
 
 from __future__ import annotations
@@ -22,6 +26,10 @@ from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
 
 AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
+_Number = TypeVar("_Number", np.float64, np.int64)
+_OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+_FEW = 200  # loads whose responses take little, and are always made once for all
+_CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below which digits are lost
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,11 +125,6 @@ class ResponseMaps(FrozenValue):
                 part = slice(start, start + step)
                 out[part] = (maps @ states[part].T).T
         return out
-
-
-_Number = TypeVar("_Number", np.float64, np.int64)
-_OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
-_FEW = 200  # loads whose responses take little, and are always made once for all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -574,9 +577,6 @@ def brace(matrices: Floats, pairs: Pairs, width: int) -> None:
     first = np.array([pairs.first, pairs.second, pairs.second])
     second = np.array([pairs.first, pairs.second, pairs.first])
     blocks[first, :, second, :, pairs.sets] += np.array([block, block, -block])
-
-
-_CLOSE = 1e-4  # flexibility of two grips on one brick, over its own, below which digits are lost
 
 
 def nearly_rigid(

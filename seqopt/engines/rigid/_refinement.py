@@ -63,6 +63,10 @@ from seqopt.network.network import GROUND, Network
 _NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
 _PANEL = 4  # columns that are eliminated together: few, since each meets few others
 _SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
+_TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
+_TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
+_STEPS = 5  # corrections, after which a set is solved on its own
+_HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
 
 
 class _HeldSystem:
@@ -133,9 +137,6 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     return sparse.csr_array(rows)
 
 
-_TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
-
-
 def _held_operator(
     system: _HeldSystem, inner: sparse.csr_array | None = None
 ) -> ComplianceOperator:
@@ -193,11 +194,6 @@ def _operator(
         softness=softness,
         moments=moments,
     )
-
-
-_TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
-_STEPS = 5  # corrections, after which a set is solved on its own
-_HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
 
 
 class Refinement:

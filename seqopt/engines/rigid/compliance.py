@@ -67,6 +67,10 @@ _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's ca
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 _UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
+_LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on blocks are sooner
+_KEPT = 32e6  # bytes of operators that may stay when another is made
+_SCREEN = 1e-6  # largest error, as `ACCURACY`, of what is only to be compared
+_EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
 
 
 class _FastSolution:
@@ -181,12 +185,6 @@ def _squared(vectors: Floats) -> Floats:
 def _can_compile() -> bool:
     """Return whether loops can be compiled: numba is there."""
     return find_spec("numba") is not None
-
-
-_LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on blocks are sooner
-_KEPT = 32e6  # bytes of operators that may stay when another is made
-_SCREEN = 1e-6  # the same, of what is only to be compared
-_EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
 
 
 class ComplianceEngine(NamedEngine):
