@@ -25,18 +25,15 @@ def analyze_each(
     within: LinearRange, steps: Iterable[Step], faults: dict[int, SeqoptError]
 ) -> pd.DataFrame:
     """Return responses of steps that an engine solves; others' errors by number in ``faults``."""
-    return response_table(within.engine.network, _solved(within, steps, faults))
 
+    def solved() -> Iterator[tuple[Step, Fields]]:
+        for step in steps:
+            try:
+                yield step, within.seen(step, step_fields(within.engine, step, Want.ALL))
+            except (MechanismError, SolverError) as error:
+                faults[step.number] = _fault(within.engine, step, error)
 
-def _solved(
-    within: LinearRange, steps: Iterable[Step], faults: dict[int, SeqoptError]
-) -> Iterator[tuple[Step, Fields]]:
-    """Yield solved steps with fields; errors of the others go to ``faults``, by step number."""
-    for step in steps:
-        try:
-            yield step, within.seen(step, step_fields(within.engine, step, Want.ALL))
-        except (MechanismError, SolverError) as error:
-            faults[step.number] = _fault(within.engine, step, error)
+    return response_table(within.engine.network, solved())
 
 
 def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:

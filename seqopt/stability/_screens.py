@@ -64,6 +64,7 @@ Where no forces exist, the answer claims that, has no value and a motion that sa
 
 CompileHeld = Callable[[Assembly, Case], HeldProgram]
 """Makes the program of an assembly, whose grips are all that may ever be held, and a case."""
+
 _TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
 _IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 _Settled = Callable[[Floats], Bools]

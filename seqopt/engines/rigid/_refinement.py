@@ -236,13 +236,13 @@ class Refinement:
         ``operator``: of these grips, if there is one; it serves if nothing is loose. ``largest``:
         correction of a set after which it needs no other, over the largest of each kind.
         """
-        every = [slice(i, i + _TOGETHER) for i in range(0, len(columns), _TOGETHER)]
-        if operator is None or self.held.loose:
-            operator = self.own
+        operator = self.own if operator is None or self.held.loose else operator
         corrector = _Corrector(self, operator, largest)
-        own = [compliance.select(part) for part in every]
-        parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
-        return _join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
+        parts = [no_sets(self.network, self.bricks, columns.shape[1])]
+        for start in range(0, len(columns), _TOGETHER):
+            part = slice(start, start + _TOGETHER)
+            parts.append(corrector.together(columns[part], compliance.select(part)))
+        return _join_sets(parts)
 
 
 @dataclass(frozen=True)
@@ -322,7 +322,7 @@ class _Corrector:
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
         moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
-        off = None
+        apart = None
         if not compliance.rigid:  # how far grips let their nodes be
             bears = force.reshape(*columns.shape, operator.width)
             off = np.zeros(bears.shape)
@@ -330,7 +330,7 @@ class _Corrector:
                 off += np.einsum("srij,srj->sri", compliance.transmitted, bears)
             if compliance.moved is not None:
                 off[..., :3] -= compliance.moved
-        apart = None if off is None else as_rows(off)
+            apart = as_rows(off)
         pairs, rows = pairs_of(operator.across, columns), np.ascontiguousarray(index.T)
         right = np.ascontiguousarray(moved.T)
         change = undone(operator, pairs, rows, right, compliance, apart)[0].T
