@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pandas as pd
 
 from seqopt._files import parse_json, read_text
-from seqopt._later import Later
-from seqopt._registry import offered
+from seqopt._registry import Later, offered
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, find_engine
@@ -34,9 +33,8 @@ from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses import table
-from seqopt.scene._armed import find_postures
 from seqopt.scene.scenarios import as_built
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
@@ -45,7 +43,7 @@ from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Site, Step
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
-from seqopt.study.published import CRITERIA, PUBLISHED, is_reference_arch, published_plan
+from seqopt.study import CRITERIA, PUBLISHED, is_reference_arch, published_plan
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import Search, optimize, parse_numbers, pose_build
 

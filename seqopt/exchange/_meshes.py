@@ -10,12 +10,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
-from seqopt.scene._checks import short
-from seqopt.scene.boxes import as_vectors
+from seqopt.scene._checks import as_vectors, short
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 NX, SPATIAL = Later("networkx"), Later("scipy.spatial")  # 0.3 and 0.2 s, for imports alone

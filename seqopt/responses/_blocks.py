@@ -32,7 +32,7 @@ from seqopt.responses.quantities import (
     lengths,
     require_finite,
 )
-from seqopt.work._threads import one_thread
+from seqopt.work._workers import one_thread
 
 
 @dataclass(frozen=True, eq=False, repr=False)

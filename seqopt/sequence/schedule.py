@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
-from seqopt._later import Later
-from seqopt._showing import Shown, display
+from seqopt._registry import Later, Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import GROUND, Network

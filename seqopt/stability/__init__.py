@@ -18,7 +18,7 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import Stability, Verdict, assess

@@ -31,7 +31,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.work._threads import one_thread
+from seqopt.work._workers import one_thread
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from seqopt._showing import Shown
+from seqopt._registry import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar

@@ -33,7 +33,7 @@ from seqopt.engines.rigid._operator import (
     SceneMaps,
     load_rows,
 )
-from seqopt.work._threads import cores, in_threads, one_thread
+from seqopt.work._workers import cores, in_threads, one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
 

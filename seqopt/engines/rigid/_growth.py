@@ -25,7 +25,7 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.work._threads import cores, in_threads
+from seqopt.work._workers import cores, in_threads
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -20,7 +20,7 @@ from seqopt.network._mechanics import (
     spread,
 )
 from seqopt.network.network import Network
-from seqopt.work._threads import one_thread
+from seqopt.work._workers import one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
 

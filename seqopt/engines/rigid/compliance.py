@@ -47,7 +47,7 @@ from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, 
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work._threads import one_thread
+from seqopt.work._workers import one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._frontal import FrontalSystem

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seqopt._showing import Shown
+from seqopt._registry import Later, Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
@@ -48,7 +48,6 @@ from seqopt.responses._grip_sets import BAND, GripSets, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
-from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -57,9 +56,9 @@ from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
-    from seqopt.sequence._rule_space import FreeSpace
-    from seqopt.sequence._schedule_space import ScheduleSpace
+    from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
+SCENARIOS = Later("seqopt.scene.scenarios")  # where there are some
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
@@ -256,8 +255,7 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
-        from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
+        from seqopt.sequence._space import ScheduleSpace, free_space  # noqa: PLC0415  # candidates need none
 
         network, rules, caps, worlds = self.network, self.rules, self.caps, self.worlds
         if isinstance(rules, Schedule):  # its robots are never alike
@@ -373,7 +371,7 @@ class States(Shown):
     ) -> tuple[StateArrays, Bools]:
         """Return states as amounts and filters see them, and which pass the filters.
 
-        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether single precision
+        ``states`` (n, c): as in `seqopt.sequence._space`; ``rough``: whether single precision
         is enough, except close to a limit. Stability is evaluated later.
         """
         seen = self.seen(level, states, rough=rough)
@@ -715,7 +713,7 @@ def over_scenarios(
             "worst-total, or take worst values"
         )
     for number, scene in enumerate(scenes, start=1):
-        require_alike(problem.network.scene, scene, number)
+        SCENARIOS.require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
     return _asked(replace(problem, scenarios=engines, over=over))
 
