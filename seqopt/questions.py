@@ -93,7 +93,11 @@ def find_steps(
         return _read_steps(network, steps)
     find_postures(scene, cache, progress)
     if steps is None:
-        return _usual_steps(network, names, progress)
+        for name, method in METHODS.items():  # the first that fits
+            with suppress(StepError):
+                return Given(network, name, method(network, names))
+        plan = optimize(scene, FREE, progress=progress)
+        return Given(network, plan.title, plan.steps, plan.result)
     if steps != PUBLISHED:
         return Given(network, str(steps), METHODS[str(steps)](network, names))
     if not is_reference_arch(scene):
@@ -115,15 +119,6 @@ def _read_steps(network: Network, steps: Steps) -> Given:
         )
     file = path / "plan.csv" if path.is_dir() else path
     return Given(network, path.stem, read_plan(network.scene, file))
-
-
-def _usual_steps(network: Network, robots: Sequence[str], tell: Tell | None) -> Given:
-    """Return the steps of the first fixed method that fits, else of the best free schedule."""
-    for name, method in METHODS.items():
-        with suppress(StepError):
-            return Given(network, name, method(network, robots))
-    plan = optimize(network.scene, FREE, progress=tell)
-    return Given(network, plan.title, plan.steps, plan.result)
 
 
 def find_build(
@@ -372,7 +367,13 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     if told["direction"] and missing:
         raise StepError("missing: bricks are missing in a build; a take-down removes them anyway")
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
-    built = scene if measured is None else _as_measured(scene, site, Path(measured))
+    built = scene
+    if measured is not None:
+        where = offered("read_measured")(scene, Path(measured))
+        if early := [n for n in where if n in scene.build_order[site.bricks :]]:
+            said = f"brick {early[0]} does not stand yet; leave it out"
+            raise StepError(f"measured {Path(measured)}: {said}")
+        built = as_built(scene, where)
     built = find_scene(built, payload=payload, grips=grips, durations=durations, robots=robots)
     begin = _Place(site, done) if isinstance(build, Plan) else f"{build}:{at}"
     changed = {"to": to, "lost": lost, "missing": missing, "direction": told.pop("direction")}
@@ -413,11 +414,3 @@ def _planned(
     told: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)
     told["criterion"] = told["criterion"] if told["criterion"] in CRITERIA else None
     return scene, steps, told
-
-
-def _as_measured(scene: Scene, site: Site, path: Path) -> Scene:
-    """Return a scene with bricks that stand where they were measured."""
-    found, stand = offered("read_measured")(scene, path), scene.build_order[: site.bricks]
-    if early := [name for name in found if name in scene.build_order and name not in stand]:
-        raise StepError(f"measured {path}: brick {early[0]} does not stand yet; leave it out")
-    return as_built(scene, found)

@@ -41,38 +41,6 @@ class RobotKind(FrozenValue):
     cap: float  # largest force of a grip, N
 
 
-def sort_robots(
-    network: Network,
-    rules: FreeRules,
-    caps: Mapping[str, float] | None = None,
-    *,
-    timed: bool = False,
-    worlds: Sequence[Scene] = (),
-) -> tuple[RobotKind, ...]:
-    """Return the participating robots by kind, in the order of their first robots.
-
-    ``caps``: force limits of grips besides payloads, by robot, N; ``timed``: whether robots of a
-    kind must have equal durations; ``worlds``: scenes of scenarios, with other weights.
-    """
-    scene, kept = network.scene, rules.payload is Payload.KEPT
-    alike: dict[tuple[object, ...], RobotKind] = {}
-    for i in rules.team(scene):
-        robot = scene.robots[i]
-        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
-        newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
-        for k, brick in enumerate(scene.placed if newest is not reach else ()):
-            with suppress(StepError):  # it reaches none
-                newest[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
-        places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
-        places &= not rules.placers or robot.name in rules.placers
-        cap = min(robot.payload if kept else np.inf, (caps or {}).get(robot.name, np.inf))
-        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
-        key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
-        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
-        alike[key] = replace(first, robots=(*first.robots, i))
-    return tuple(alike.values())
-
-
 class Moves(NamedTuple):
     """Moves from states of one brick count."""
 
@@ -193,14 +161,6 @@ class StateRows(Terse):
         """Return the columns of robots whose grips are open at a level, in the order of moves."""
         return ()
 
-    def candidates(self, level: int) -> Candidates:
-        """Return the choices of the grips that are open at a level."""
-        raise NotImplementedError
-
-    def decided_by(self, level: int) -> Any:
-        """Return the move that decides a level: the last of those that are open in it."""
-        raise NotImplementedError
-
     def held(self, states: Ints) -> Ints:
         """Return the nodes held (n, robots), ascending, zeros of free robots first."""
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
@@ -299,9 +259,8 @@ class FreeSpace(StateRows):
     def may_place(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) allow the next move of a brick, (n,); the first may not."""
         bricks = self.bricks_at(level)
-        if self.rules.begin is None or bricks != self._span[0] or not bricks:
-            return np.ones(len(states), dtype=bool)
-        return self.lawful(bricks, states)
+        begins = self.rules.begin is not None and 0 < bricks == self._span[0]
+        return self.lawful(bricks, states) if begins else np.ones(len(states), dtype=bool)
 
     def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
@@ -454,8 +413,7 @@ class FreeSpace(StateRows):
             taken[np.arange(len(states)), nodes_held] = True
         source, node = np.nonzero(~taken[:, nodes + 1])
         number = nodes[node] + 1
-        new = states[source]
-        way = np.zeros(len(new))
+        new, way = states[source], np.zeros(len(source))
         if self.parks:
             last = -new[:, slot].astype(np.int64)
             way = np.linalg.norm(self._at[last] - self._at[number], axis=1) * (last > 0)
@@ -489,9 +447,7 @@ def _follow(
             if stays.get(robot, 0) in left and len(free) > 1:  # it is seen to stay free
                 left.remove(stays.get(robot, 0))
                 free = [r for r in free if r != robot]
-        robot = free[0]
-        grips[robot] = node
-        stays[robot] = wanted[node]
+        grips[free[0]], stays[free[0]] = node, wanted[node]
     return bool(fresh)
 
 
@@ -538,15 +494,30 @@ def free_space(
     timed: bool = False,
     worlds: Sequence[Scene] = (),
 ) -> FreeSpace:
-    """Return the state space of a free schedule in a scene.
+    """Return the state space of a free schedule, its robots by kind, in the order of their first.
 
     ``caps``: force limits of grips besides payloads, by robot, N; ``parks``: whether states track
-    the positions of free robots, for their travel; ``timed``: whether durations of robots matter;
-    ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
+    the positions of free robots, for their travel; ``timed``: whether robots of a kind must have
+    equal durations; ``worlds``: scenes of scenarios, in which robots must carry their bricks too.
     """
-    kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
-    rules = rules.begun(network.scene)
-    return (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
+    scene, kept = network.scene, rules.payload is Payload.KEPT
+    alike: dict[tuple[object, ...], RobotKind] = {}
+    for i in rules.team(scene):
+        robot = scene.robots[i]
+        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
+        newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
+        for k, brick in enumerate(scene.placed if newest is not reach else ()):
+            with suppress(StepError):  # it reaches none
+                newest[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
+        places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
+        places &= not rules.placers or robot.name in rules.placers
+        cap = min(robot.payload if kept else np.inf, (caps or {}).get(robot.name, np.inf))
+        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
+        key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
+        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
+        alike[key] = replace(first, robots=(*first.robots, i))
+    space = _TakeDownSpace if rules.takes_down else FreeSpace
+    return space(network, rules.begun(scene), tuple(alike.values()), parks)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -649,13 +620,17 @@ class ScheduleSpace(StateRows):
         step, columns = self.rules.steps[level - 1], self.open_columns(level)
         moves = [self.rules.moves[m] for m in step.moves]
         places = tuple(np.array([self._place[n] for n in move.candidates]) for move in moves)
-        own = [0 if isinstance(grip, OpenGrip) else self._place.get(grip, 0) for grip in step.grips]
         grid = np.meshgrid(*places, indexing="ij")
-        states: Ints = np.tile(np.array(own, dtype=np.int32), (grid[0].size, 1))
+        states: Ints = np.tile(self._given(step), (grid[0].size, 1))
         states[:, columns] = np.stack([each.ravel() for each in grid], axis=1)
         possible = self._possible(step, states)
         shaped = possible.reshape(grid[0].shape)
         return Candidates(columns, places, states[possible], shaped)
+
+    def _given(self, step: OpenStep) -> Ints:
+        """Return the state (1, robots) of a step's given grips, zeros of others."""
+        own = [0 if isinstance(grip, OpenGrip) else self._place.get(grip, 0) for grip in step.grips]
+        return np.array([own], dtype=np.int32)
 
     def decided_by(self, level: int) -> Move:
         return self.rules.moves[self.rules.steps[level - 1].moves[-1]]
@@ -663,10 +638,8 @@ class ScheduleSpace(StateRows):
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
         for level, step in reversed([*enumerate(self.rules.steps, start=1)]):
-            held = [grip for grip in step.grips if not isinstance(grip, OpenGrip)]
-            if len(held) == len(step.grips):
-                places = [self._place.get(grip, 0) for grip in held]
-                yield level, np.array([places], dtype=np.int32)
+            if not step.moves:
+                yield level, self._given(step)
 
     def ended(self, states: Ints) -> Bools:
         """Return which states of the last step end the build: all, (n,)."""

@@ -150,25 +150,6 @@ def interrupt_main() -> None:
 
 
 @contextmanager
-def _heard(over: threading.Event) -> Iterator[None]:
-    """Handle termination signals where interrupts are ignored, as in a background job."""
-    before = signal.getsignal(signal.SIGINT)
-
-    def end_only(*_: object) -> None:
-        if over.is_set():
-            raise KeyboardInterrupt
-
-    if before != signal.SIG_IGN:
-        yield
-        return
-    signal.signal(signal.SIGINT, end_only)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
 def ending(seconds: float) -> Iterator[None]:
     """Raise `TimeoutError` between two instructions of a block that exceeds its time limit.
 
@@ -179,25 +160,32 @@ def ending(seconds: float) -> Iterator[None]:
     if math.isinf(seconds) or threading.current_thread() is not threading.main_thread():
         yield
         return
-    over = threading.Event()
+    over, before = threading.Event(), signal.getsignal(signal.SIGINT)
 
     def end() -> None:
         over.set()
         interrupt_main()
 
+    def end_only(*_: object) -> None:
+        if over.is_set():
+            raise KeyboardInterrupt
+
     timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
     timer.daemon = True
+    if before == signal.SIG_IGN:  # as in a background job, where only the end is heard
+        signal.signal(signal.SIGINT, end_only)
     try:
-        with _heard(over):
-            timer.start()
-            yield
-            timer.cancel()
-            timer.join()  # an end that is on its way comes now, and not later
+        timer.start()
+        yield
+        timer.cancel()
+        timer.join()  # an end that is on its way comes now, and not later
     except KeyboardInterrupt:
         if not over.is_set():
             raise
         raise TimeoutError from None
     finally:
+        if before == signal.SIG_IGN:
+            signal.signal(signal.SIGINT, before)
         timer.cancel()
 
 
