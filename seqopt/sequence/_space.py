@@ -356,9 +356,8 @@ class FreeSpace(StateRows):
         begin = _begin_step(self.network.scene, self.rules.begin)
         grips: list[int | None] = [*begin.grips]
         lasts = (begin.grips, self.rules.begin.stays) if self.rules.begin else ()
-        stays = {  # where a robot was last, as a place from 1
-            r: self._place[n] for nodes in lasts for r, n in enumerate(nodes) if n is not None
-        }
+        # where a robot was last, as a place from 1
+        stays = {r: self._place[n] for nodes in lasts for r, n in enumerate(nodes) if n is not None}
         before, out = begin.bricks, list[Step]()
         for level, *entries in states:
             if len(entries) < self.robots or not all(abs(n) < len(numbers) for n in entries):
