@@ -616,6 +616,7 @@ class ScheduleSpace(StateRows):
         return () if step is None else tuple(step.grips.index(OpenGrip(m)) for m in step.moves)
 
     def candidates(self, level: int) -> Candidates:
+        """Return the choices of the grips that are open at a level."""
         step, columns = self.rules.steps[level - 1], self.open_columns(level)
         moves = [self.rules.moves[m] for m in step.moves]
         places = tuple(np.array([self._place[n] for n in move.candidates]) for move in moves)
@@ -632,6 +633,7 @@ class ScheduleSpace(StateRows):
         return np.array([own], dtype=np.int32)
 
     def decided_by(self, level: int) -> Move:
+        """Return the move that decides a level: the last of those that are open in it."""
         return self.rules.moves[self.rules.steps[level - 1].moves[-1]]
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:

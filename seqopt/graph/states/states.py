@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
     from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
-SCENARIOS = Later("seqopt.scene.scenarios")  # where there are some
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
@@ -712,8 +711,8 @@ def over_scenarios(
             f"aim {sums[0]}: the worst total of scenarios is no total of worst states; give "
             "worst-total, or take worst values"
         )
-    for number, scene in enumerate(scenes, start=1):
-        SCENARIOS.require_alike(problem.network.scene, scene, number)
+    for number, scene in enumerate(scenes, start=1):  # of a module that others do without
+        Later("seqopt.scene.scenarios").require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
     return _asked(replace(problem, scenarios=engines, over=over))
 
