@@ -35,7 +35,7 @@ from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
 from seqopt.scene.boxes import box_corners
-from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
+from seqopt.study import WORST_RATIO, as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
 WORDS = (

@@ -23,7 +23,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from seqopt._later import later
+from seqopt._registry import later
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")  # also of type checkers
 _HOME_OF = {name: home for home, name in re.findall(r"from seqopt\.(\S+) import (\w+)", _STUB)}

@@ -45,7 +45,7 @@ from seqopt.sequence.schedule_file import read_plan as read_plan
 from seqopt.sequence.schedule_file import read_schedule as read_schedule
 from seqopt.sequence.steps import Site as Site
 from seqopt.sequence.steps import Step as Step
-from seqopt.study.published import CRITERIA as CRITERIA
+from seqopt.study import CRITERIA as CRITERIA
 from seqopt.workflow import Robust as Robust
 from seqopt.workflow import Search as Search
 from seqopt.workflow import optimize as optimize

@@ -13,8 +13,6 @@ import traceback
 from collections.abc import Callable
 from types import FrameType
 
-from seqopt._interrupts import interrupt_main
-
 INTERRUPTED, FAILED, CRASHED = 130, 4, 70  # as `Status`, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
@@ -27,10 +25,18 @@ def run() -> int:
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         _require_room()
         from seqopt._cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
+        from seqopt.work.progress import interrupt_main  # noqa: PLC0415
 
         load(sys.argv[1:])
 
-        sys.unraisablehook = _raise_again
+        def raise_again(lost: sys.UnraisableHookArgs) -> None:
+            """Repeat an interrupt that was raised where exceptions are ignored."""
+            if issubclass(lost.exc_type, KeyboardInterrupt):
+                threading.Timer(AGAIN, interrupt_main).start()  # at once it would meet this hook
+            else:
+                sys.__unraisablehook__(lost)
+
+        sys.unraisablehook = raise_again
         _answer_signals(signal.default_int_handler)
         status = main()
     except KeyboardInterrupt:
@@ -79,14 +85,6 @@ def _leave(*_: object) -> None:
     with contextlib.suppress(OSError):
         os.write(2, b"seqopt: interrupted\n")
     os._exit(INTERRUPTED)
-
-
-def _raise_again(lost: sys.UnraisableHookArgs) -> None:
-    """Repeat an interrupt that was raised where exceptions are ignored, as in a finalizer."""
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(AGAIN, interrupt_main).start()  # at once it would meet this hook
-    else:
-        sys.__unraisablehook__(lost)
 
 
 def _require_room() -> None:

@@ -1,5 +1,8 @@
 """Extension points of the core: offers of outer rooms, found by name and loaded on demand.
 
+Pictures of values are among them: `seqopt.report` draws, and imports scenes and plans. Modules and
+names of a package may wait in the same way; milliseconds beside a `Later` are what others save.
+
 A room with another amount, filter or command adds a line here. The core works without any
 of them. Plug-ins add amounts, filters, formats and commands by entry points of the group
 ``seqopt.parts``, users by `seqopt.register`.
@@ -7,15 +10,49 @@ of them. Plug-ins add amounts, filters, formats and commands by entry points of 
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from types import ModuleType
 from typing import Any, TypeVar
 
-from seqopt.errors import PluginWarning, message_of, plugins
+from seqopt.errors import ExtraError, PluginWarning, message_of, plugins
 
 _Kind = TypeVar("_Kind")
+
+
+class Later(ModuleType):
+    """A module by its name, loaded when something of it is first used."""
+
+    def __getattr__(self, name: str) -> Any:
+        if sys.modules.get(self.__name__) is self:
+            del sys.modules[self.__name__]
+        return getattr(import_module(self.__name__), name)
+
+
+def later(
+    page: str, homes: Mapping[str, str]
+) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return ``__getattr__`` and ``__dir__`` of a package with lazy names (PEP 562).
+
+    ``homes``: the module of the package that defines each name.
+    """
+    own = vars(sys.modules[page])
+
+    def found(name: str) -> object:
+        if name not in homes:
+            raise AttributeError(f"module {page!r} has no attribute {name!r}")
+        value: object = getattr(import_module(f"{page}.{homes[name]}"), name)
+        own[name] = value
+        return value
+
+    def names() -> list[str]:
+        return [*own.keys() | homes.keys()]
+
+    return found, names
+
 
 VIEWS = {
     "Shown.html": "seqopt.report._notebook:card",
@@ -153,11 +190,29 @@ def offered(name: str) -> Any:
         return None
 
 
-def view(kind: type, way: str) -> Any:
-    """Return the renderer of a class of values, loaded on first use."""
+def display(kind: type, way: str) -> Callable[..., Any]:
+    """Return the renderer of a class of values, as ``plot``, loaded on first use."""
     keys = (f"{each.__name__}.{way}" for each in kind.__mro__)
     home, name = next(VIEWS[key] for key in keys if key in VIEWS).split(":")
-    return getattr(import_module(home), name)
+    try:
+        found: Callable[..., Any] = getattr(import_module(home), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "matplotlib":
+            raise
+        raise ExtraError(
+            "pictures need matplotlib, which is not installed: pip install 'seqopt[plot]'"
+        ) from None
+    return found
+
+
+class Shown:
+    """Base class of values that notebooks show as a small table with a picture."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Return the table and, where matplotlib is installed, the picture, as HTML."""
+        return str(display(type(self), "html")(self))
 
 
 def registered(kind: type[_Kind]) -> dict[str, _Kind]:

@@ -1,47 +1,18 @@
-"""What shows values, registered by their classes, since values may not import it.
-
-Pictures are drawn by `seqopt.report`, which imports scenes and plans. These ask `display` for what
-is registered for them.
-"""
+"""Pages that a notebook or a browser shows."""
 
 from __future__ import annotations
 
 import tempfile
 import webbrowser
-from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from seqopt._files import write_text
-from seqopt._registry import view
-from seqopt.errors import ExtraError
+from seqopt._registry import display
 
 PAGE = "report.html"  # the page in a folder that a command writes
-
-
-def display(kind: type, way: str) -> Callable[..., Any]:
-    """Return the renderer of a class of values, as ``plot``, loaded on first use."""
-    try:
-        found: Callable[..., Any] = view(kind, way)
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] != "matplotlib":
-            raise
-        raise ExtraError(
-            "pictures need matplotlib, which is not installed: pip install 'seqopt[plot]'"
-        ) from None
-    return found
-
-
-class Shown:
-    """Base class of values that notebooks show as a small table with a picture."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str:
-        """Return the table and, where matplotlib is installed, the picture, as HTML."""
-        return str(display(type(self), "html")(self))
 
 
 @dataclass(frozen=True, repr=False)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pandas as pd
 
 from seqopt._files import parse_json, read_text
-from seqopt._later import Later
-from seqopt._registry import offered
+from seqopt._registry import Later, offered
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, find_engine
@@ -34,9 +33,8 @@ from seqopt.problem.filters import Filter
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses import table
-from seqopt.scene._armed import find_postures
 from seqopt.scene.scenarios import as_built
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
@@ -45,7 +43,7 @@ from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Site, Step
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
-from seqopt.study.published import CRITERIA, PUBLISHED, is_reference_arch, published_plan
+from seqopt.study import CRITERIA, PUBLISHED, is_reference_arch, published_plan
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import Search, optimize, parse_numbers, pose_build
 
@@ -95,7 +93,11 @@ def find_steps(
         return _read_steps(network, steps)
     find_postures(scene, cache, progress)
     if steps is None:
-        return _usual_steps(network, names, progress)
+        for name, method in METHODS.items():  # the first that fits
+            with suppress(StepError):
+                return Given(network, name, method(network, names))
+        plan = optimize(scene, FREE, progress=progress)
+        return Given(network, plan.title, plan.steps, plan.result)
     if steps != PUBLISHED:
         return Given(network, str(steps), METHODS[str(steps)](network, names))
     if not is_reference_arch(scene):
@@ -117,15 +119,6 @@ def _read_steps(network: Network, steps: Steps) -> Given:
         )
     file = path / "plan.csv" if path.is_dir() else path
     return Given(network, path.stem, read_plan(network.scene, file))
-
-
-def _usual_steps(network: Network, robots: Sequence[str], tell: Tell | None) -> Given:
-    """Return the steps of the first fixed method that fits, else of the best free schedule."""
-    for name, method in METHODS.items():
-        with suppress(StepError):
-            return Given(network, name, method(network, robots))
-    plan = optimize(network.scene, FREE, progress=tell)
-    return Given(network, plan.title, plan.steps, plan.result)
 
 
 def find_build(
@@ -374,7 +367,13 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     if told["direction"] and missing:
         raise StepError("missing: bricks are missing in a build; a take-down removes them anyway")
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
-    built = scene if measured is None else _as_measured(scene, site, Path(measured))
+    built = scene
+    if measured is not None:
+        where = offered("read_measured")(scene, Path(measured))
+        if early := [n for n in where if n in scene.build_order[site.bricks :]]:
+            said = f"brick {early[0]} does not stand yet; leave it out"
+            raise StepError(f"measured {Path(measured)}: {said}")
+        built = as_built(scene, where)
     built = find_scene(built, payload=payload, grips=grips, durations=durations, robots=robots)
     begin = _Place(site, done) if isinstance(build, Plan) else f"{build}:{at}"
     changed = {"to": to, "lost": lost, "missing": missing, "direction": told.pop("direction")}
@@ -415,11 +414,3 @@ def _planned(
     told: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)
     told["criterion"] = told["criterion"] if told["criterion"] in CRITERIA else None
     return scene, steps, told
-
-
-def _as_measured(scene: Scene, site: Site, path: Path) -> Scene:
-    """Return a scene with bricks that stand where they were measured."""
-    found, stand = offered("read_measured")(scene, path), scene.build_order[: site.bricks]
-    if early := [name for name in found if name in scene.build_order and name not in stand]:
-        raise StepError(f"measured {path}: brick {early[0]} does not stand yet; leave it out")
-    return as_built(scene, found)

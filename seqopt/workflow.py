@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from seqopt._registry import offered
+from seqopt._registry import Later, offered
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError, did_you_mean
@@ -27,19 +27,20 @@ from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import LARGEST, Criterion, Limit, number_word, split_word
 from seqopt.problem.standing import Standing
 from seqopt.responses._grip_sets import Resources
-from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
-from seqopt.scene.scenarios import scenarios as sample
-from seqopt.scene.scene import Scene
-from seqopt.sequence.part import Part, _Place, find_scene
+from seqopt.scene.scene import Scene, find_postures
+from seqopt.sequence.part import Part, _Place, find_scene, find_schedule
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Site, StepKind
-from seqopt.study.published import EQUATIONS, find_criterion
+from seqopt.study import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell
 
+if TYPE_CHECKING:
+    from seqopt.scene.scenarios import Scenarios
+
+SCENARIOS = Later("seqopt.scene.scenarios")  # where there are some
 SPREADS = ("stiffness", "density", "position", "grips")
 SEARCH = "search"  # the order that is sought
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
@@ -187,8 +188,8 @@ class Robust:
         vary = self.vary
         if not isinstance(vary, Mapping):
             vary = parse_numbers("vary", vary, SPREADS, zero=True)
-        spread = {"stiffness": 3.0, "grips": 1.0, **vary}
-        factor, grips = spread.pop("stiffness"), spread.pop("grips")
+        spread: dict[str, Any] = {"stiffness": 3.0, "grips": 1.0, **vary}
+        factor, grips = spread["stiffness"], spread["grips"]
         for name, each in (("stiffness", factor), ("grips", grips)):
             if each < 1:
                 raise ProblemError(f"vary {name}={each:g}: give a factor from 1")
@@ -196,11 +197,9 @@ class Robust:
             raise ProblemError(
                 f"vary grips={grips:g}: they are rigid; say how stiff with --grips or with_grips"
             )
-        factors = (1 / factor, factor)
-        held = (1 / grips, grips)
-        return sample(
-            scene, stiffness=factors, grips=held, count=self.count, seed=self.seed, **spread
-        )
+        spread |= {"stiffness": (1 / factor, factor), "grips": (1 / grips, grips)}
+        drawn: Scenarios = SCENARIOS.scenarios(scene, count=self.count, seed=self.seed, **spread)
+        return drawn
 
 
 def optimize(  # noqa: PLR0913  # every question is a word of its own

@@ -9,7 +9,8 @@ import numpy as np
 from seqopt.contact.faces import bare_assembly
 from seqopt.exchange.contacts import flat_face
 from seqopt.network.build import build_network
-from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
+from seqopt.scene._checks import as_vectors
+from seqopt.scene.boxes import block_brick, vertices_of
 from seqopt.scene.parts import Ground, Joint
 from seqopt.scene.shape import Polyhedron
 

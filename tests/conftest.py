@@ -20,7 +20,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.pose import pose
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from tests.quality.kernels import running
 
 # modules and tests stay until the end: the collector need not look at them again and again

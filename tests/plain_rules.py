@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 
-from seqopt.sequence._rule_check import RuleBook
-from seqopt.sequence.rules import Ending, Newest
+from seqopt.sequence.rules import Ending, Newest, RuleBook
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.steps import Grips, StepKind
 

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from experiments.harness.layers import Budget, LayeredCosts
 from experiments.harness.scenes import running_bond
+from seqopt.scene._checks import as_vectors
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.boxes import as_vectors, vertices_of
+from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Anywhere, Load, Prop, Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import ROBOTS
+from seqopt.study import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
 from tests.layered import Costs
 

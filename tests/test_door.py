@@ -42,13 +42,13 @@ SELDOM = (
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
-    "seqopt.sequence._rule_space",
+    "seqopt.sequence._space",
 )
 FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]
 ASSESS = ["assess", "chain:bricks=7", "--method", "cantilever"]
 MAIN = "from seqopt._cli.main import load, main\n"
 STAGES = {  # what one interpreter does, one after the other, and what is not loaded then
-    "import seqopt": ("numpy", "seqopt.scene", "seqopt._registry"),
+    "import seqopt": ("numpy", "seqopt.scene", "seqopt._files"),
     f"{MAIN}main([])": LIGHT,
     "main(['--help'])": LIGHT,
     "main(['--version'])": LIGHT,

@@ -87,4 +87,4 @@ def test_a_wrong_example_is_seen():
     assert "Expected:\n    3\nGot:\n    2" in failures([wrong])
     assert len(WITH_EXAMPLES) > 15
     assert len(ROOMS) > 10
-    assert "CRITERIA" in [test.name for test in examples(import_module("seqopt.study.published"))]
+    assert "CRITERIA" in [test.name for test in examples(import_module("seqopt.study"))]

@@ -21,11 +21,11 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system
 from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.exchange._meshes import Surface
 from seqopt.exchange.contacts import touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.boxes import _faces
-from seqopt.scene.shape import Surface
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import assess, bonded, load_factor
 from seqopt.stability.limit_analysis import Prover

@@ -49,7 +49,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
 from seqopt.scene.parts import Brick
 from seqopt.sequence.methods import METHODS
-from seqopt.study.published import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
+from seqopt.study import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
 
 SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1
 # Which node of a brick that lies across is on the arch line: the grips that twist in A.1 and A.2.

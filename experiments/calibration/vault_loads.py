@@ -37,7 +37,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene import Load
 from seqopt.stability.assessment import load_factor
-from seqopt.study.published import printed
+from seqopt.study import printed
 
 UNIT = 1000.0  # N; the load of which multiples are sought
 

@@ -40,7 +40,7 @@ from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.report._style import GRAY, dress, looks, plain, styled
 from seqopt.responses import Resources
 from seqopt.sequence.steps import Step
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 
 Done = tuple[Engine, Sequence[Step], int]
 LOOKED_AT, OF_LARGE = 40, 6  # steps of a run, and brick counts, whose errors are looked at

@@ -25,7 +25,7 @@ from seqopt.report._style import GRAY, dress, looks, plain, styled
 from seqopt.report.comparison import largest
 from seqopt.report.text import UNITS
 from seqopt.sequence.methods import METHODS
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 
 ARM, RIGID = 1e6, float("inf")  # N/m
 BAND = (2e5, 2e6)  # N/m; about where arms of industry are, see docs/robots.md

@@ -18,7 +18,7 @@ from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
-from seqopt.study.published import EQUATIONS, ROBOTS, SOURCE, printed, published_plan
+from seqopt.study import EQUATIONS, ROBOTS, SOURCE, printed, published_plan
 
 
 def arch25() -> ComplianceEngine:

@@ -44,7 +44,7 @@ def errors(produced: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
 
     It is what exceeds the rounding, over the printed size or 1, whichever is larger; NaN where the
     table prints nothing. F_rob and F_sup are compared without sign. Produced tables must be as
-    printed (`seqopt.study.published.as_printed`).
+    printed (`seqopt.study.as_printed`).
     """
     unsigned = [name for name in VALUES if name.startswith("F_rob") or name == "F_sup_N"]
     want = printed.set_index("step")[[*VALUES]].astype(float)

@@ -43,7 +43,7 @@ from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit, SceneFacts
 from seqopt.report._style import dress, looks, styled
 from seqopt.scene.scenarios import _stiffened, shifted, weighed
-from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 Grids = dict[str, tuple[float, ...]]
 FACTORS = (1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0)

@@ -49,7 +49,7 @@ from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, Problem, Robust
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study import EQUATIONS, WEIGHTED, WORST_RATIO
 
 Choice = tuple[int, ...]
 

@@ -43,7 +43,7 @@ from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.table import step_fields
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, thin
-from seqopt.study.published import PUBLISHED_BEST
+from seqopt.study import PUBLISHED_BEST
 
 History = TypeVar("History")
 Advance = Callable[[History, Step], tuple[History, Fields]]

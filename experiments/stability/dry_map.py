@@ -30,7 +30,7 @@ from seqopt.problem.standing import Standing
 from seqopt.report._style import SMALL, styled
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot
-from seqopt.study.published import CRITERIA
+from seqopt.study import CRITERIA
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m
 FRICTIONS, ROBOTS = (0.2, 0.3, 0.466, 0.8), (2, 3, 4)

@@ -36,7 +36,7 @@ from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import MARGINS, bonded
 from seqopt.stability.limit_analysis import Prover
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4
 LIMITS = {"D_max_1e-3mm": 100.0, "M_sup_Nm": 30.0, "F_largest_N": 392.4}

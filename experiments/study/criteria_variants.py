@@ -29,7 +29,7 @@ from seqopt.plan.pose import graph_of, pose
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
-from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_plan
+from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION, published_plan
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
 

@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations.choice import Choose
-from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import (
@@ -56,7 +55,7 @@ from seqopt.graph.states.explored import best_margin, build_space, explore, floo
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import RobustAim
 from seqopt.work._workers import free_memory
-from seqopt.work.progress import Stage, Tell
+from seqopt.work.progress import Stage, Tell, answered
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows

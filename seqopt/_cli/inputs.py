@@ -11,8 +11,7 @@ from seqopt.engines.registry import find_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.plan.build import GivenSequence
 from seqopt.questions import Given, find_steps
-from seqopt.scene._armed import find_postures
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import plan_folder
 from seqopt.work.progress import Tell

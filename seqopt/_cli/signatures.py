@@ -247,7 +247,8 @@ def signature_of(function: Callable[..., Any]) -> Signature:
     for each in own.values():
         default = MISSING if each.default is each.empty else each.default
         kind = each.annotation  # evaluated alone: what is returned may load pandas
-        kind = eval(kind, home) if isinstance(kind, str) else kind
+        if isinstance(kind, str) and each.name not in HIDDEN:
+            kind = eval(kind, home)
         option = _option(each.replace(annotation=kind), default, foreign=foreign)
         called = option.more.get("call")
         maker = called or (None if foreign else SPREAD.get(each.name))

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.errors import FileError, PluginWarning, SceneWarning
 
 NUMPY = Later("numpy")  # 50 ms

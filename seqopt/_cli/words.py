@@ -23,7 +23,7 @@ from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.part import Part, find_scene
 from seqopt.stability.assessment import MARGINS
-from seqopt.study.published import CRITERIA, PUBLISHED
+from seqopt.study import CRITERIA, PUBLISHED
 from seqopt.workflow import Robust, Search
 
 File: TypeAlias = Annotated[Path | None, ("value", "FILE")]

@@ -19,7 +19,7 @@ True
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 from seqopt.arms.reach import find_postures
 
 if TYPE_CHECKING:

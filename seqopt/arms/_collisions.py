@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arms._model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 

@@ -12,14 +12,13 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from seqopt.arms._plan_postures import plan_postures
+from seqopt.arms._plan_postures import PlanPostures, plan_postures
 from seqopt.arrays import Terse
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.scene._armed import PlanPostures
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 

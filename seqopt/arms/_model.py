@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arms._urdf import model_path, read_urdf
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, SceneError

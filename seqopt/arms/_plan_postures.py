@@ -9,13 +9,14 @@ one alone in which it is known how.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arms.reach import find_postures
-from seqopt.scene._armed import PlanPostures, Unreached
+from seqopt.arrays import Terse
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
@@ -25,6 +26,28 @@ if TYPE_CHECKING:
 
 _Way = tuple[int, ...]  # a posture for every hold of a step, as rows of the table
 _MOST_WAYS = 20_000  # of one step that are kept
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A step without compatible postures: its number, the grips, and the reason in words."""
+
+    step: int
+    why: str
+
+
+@dataclass(frozen=True, repr=False)
+class PlanPostures(Terse):
+    """The postures of a plan.
+
+    ``steps``: by step, which row of ``table`` each robot of the scene is in; None for a robot that
+    holds nothing or has no arm, and for all where there is no way. ``unreached``: the steps that
+    arms cannot be in, or not without changing a posture while they hold.
+    """
+
+    table: PostureTable
+    steps: tuple[tuple[int | None, ...], ...]
+    unreached: tuple[Unreached, ...]
 
 
 def plan_postures(scene: Scene, steps: Sequence[Step]) -> PlanPostures | None:

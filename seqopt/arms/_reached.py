@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arms._collisions import (
     apart_pairs,
     convex,

@@ -27,7 +27,7 @@ Whether an answer can be well_conditioned is asked apart:
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import ENGINES, make_engine
 

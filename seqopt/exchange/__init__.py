@@ -18,7 +18,7 @@ Plans are written as tasks of robots, and for COMPAS (`export`).
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.exchange._content import Content, FileBlock, Given

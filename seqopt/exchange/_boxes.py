@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from seqopt._files import read_table
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.errors import SceneError
 from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock
 from seqopt.scene._checks import short

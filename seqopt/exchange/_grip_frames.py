@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
-from seqopt.scene._checks import frames
-from seqopt.scene.boxes import as_vector, vertices_of
+from seqopt.scene._checks import as_vector, frames
+from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import fans

@@ -10,13 +10,12 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from seqopt._later import Later
-from seqopt.arrays import Floats, Ints
+from seqopt._registry import Later
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
-from seqopt.scene._checks import short
-from seqopt.scene.boxes import as_vectors
-from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
+from seqopt.scene._checks import as_vectors, short
+from seqopt.scene.shape import FLAT, Polyhedron, bend, edges, fans
 
 NX, SPATIAL = Later("networkx"), Later("scipy.spatial")  # 0.3 and 0.2 s, for imports alone
 _Polygons = Sequence[Sequence[int]]
@@ -170,6 +169,14 @@ _WELDED = "vertices in one place are united"
 _TWICE = "faces that stand there twice are left out"
 _OPEN = "supports are surfaces that are not closed"
 _TURNED = "faces are turned so that all agree which side is outside"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(FrozenValue):
+    """A surface that is not closed, as of a support; both of its sides are faces."""
+
+    points: Floats  # (V, 3); m
+    faces: tuple[tuple[int, ...], ...]  # places among the vertices
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,13 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt._later import Later
-from seqopt.arms._plan_postures import plan_postures
+from seqopt._registry import Later
+from seqopt.arms._plan_postures import PlanPostures, plan_postures
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._compas_shapes import compas_frame, mesh_data, typed
 from seqopt.exchange._grip_frames import Frame, Held, brick_frame, hold
-from seqopt.scene._armed import PlanPostures
-from seqopt.scene._checks import positive
-from seqopt.scene.boxes import as_vector, vertices_of
+from seqopt.scene._checks import as_vector, positive
+from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Given
-from seqopt.exchange._meshes import Repaired
-from seqopt.scene._checks import positive, short, units
-from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields, as_vector
+from seqopt.exchange._meshes import Repaired, Surface
+from seqopt.scene._checks import as_vector, positive, short, units
+from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes, polygon_moments
+from seqopt.scene.shape import Polyhedron, normal_of, plane_axes, polygon_moments
 from seqopt.work.progress import Progress, Tell
 
 SHAPELY = Later("shapely")  # an extra

@@ -17,7 +17,7 @@ Best(path=(2, 3), values=(2.5, 2.0))
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.graph._explore import Explorer, Visited

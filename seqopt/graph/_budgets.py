@@ -46,7 +46,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import CappedSums, LabelSearch, widening

@@ -16,7 +16,7 @@ from seqopt.graph.states._visits import StateSpace, move_amounts, scenario_peaks
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Orders
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._rule_space import sort_entries
+from seqopt.sequence._space import sort_entries
 
 MOST_PARTS = 5000  # sets of bricks with a newest one, where all are looked at
 

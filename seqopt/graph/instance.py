@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from seqopt._showing import Shown
+from seqopt._registry import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, as_formulation, formulations

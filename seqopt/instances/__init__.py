@@ -13,7 +13,7 @@ files hold it as an integer program.
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.instances._files import read_instance, save_instance

@@ -14,7 +14,7 @@ import numpy as np
 
 from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import NOW, Graph, TimedGraph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target

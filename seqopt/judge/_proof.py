@@ -40,7 +40,7 @@ from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order, in_order
-from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import RuleBook
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
@@ -230,7 +230,7 @@ class Proof:
     """Lower bounds of all plans of a problem, and whether there is any plan.
 
     ``hint`` (mapping of int to (n, c) int): states of its one order that are likely to be passed,
-    by level, as of `seqopt.sequence._rule_space.FreeSpace`; only time depends on them;
+    by level, as of `seqopt.sequence._space.FreeSpace`; only time depends on them;
     ``evaluator``: of its states, of all orders in the scene's own; ``states``: how many states a
     better plan could pass. Raises `TooManyPartsError` where there are too many to be looked at.
     """

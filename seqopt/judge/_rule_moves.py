@@ -17,10 +17,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.scene._armed import posture_rules
-from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
+from seqopt.scene.scene import Scene, posture_rules
+from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload, RuleBook, unbearable
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
 from seqopt.sequence.steps import Grips, Step, StepKind
 

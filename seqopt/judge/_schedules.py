@@ -32,9 +32,8 @@ from seqopt.problem.standing import _size, slack
 from seqopt.responses._tolerance import is_tolerance, misfits_along, step_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, EXCESS_COLUMN, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
-from seqopt.scene._armed import check_postures
-from seqopt.scene.scene import Order
-from seqopt.sequence._rule_check import check_carried
+from seqopt.scene.scene import Order, check_postures
+from seqopt.sequence.rules import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 

@@ -21,7 +21,7 @@ from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import Block, solve_sets
-from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import RuleBook
 from seqopt.sequence.schedule import Schedule
 
 Tables: TypeAlias = RuleTables | ScheduleTables

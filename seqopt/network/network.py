@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seqopt._showing import Shown, display
+from seqopt._registry import Shown, display
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import units

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from seqopt._interrupts import answered
 from seqopt.arrays import Ints
 from seqopt.errors import (
     InfeasibleError,
@@ -36,7 +35,7 @@ from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
-from seqopt.work.progress import INTERRUPT
+from seqopt.work.progress import INTERRUPT, answered
 
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 Result = TypeVar("Result")

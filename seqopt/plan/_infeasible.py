@@ -41,8 +41,7 @@ from seqopt.problem.requirements import Excess, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
-from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.rules import FREE
+from seqopt.sequence.rules import FREE, RuleBook, unbearable
 from seqopt.sequence.schedule import OpenStep, loads
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none

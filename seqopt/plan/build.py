@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from seqopt._registry import offered
-from seqopt._showing import Page, Shown, display
+from seqopt._registry import Shown, display, offered
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
@@ -35,6 +34,8 @@ from seqopt.stability.assessment import MARGINS, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from seqopt._showing import Page
 
 
 class ShownBuild(Shown):

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._showing import display
+from seqopt._registry import display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance

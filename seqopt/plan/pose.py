@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
@@ -20,6 +21,9 @@ from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+
+if TYPE_CHECKING:
+    from seqopt.scene.scenarios import Scenarios
 
 AIMS = {Aim.SUM: SUM, Aim.PEAK: MINMAX}
 

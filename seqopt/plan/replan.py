@@ -15,7 +15,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.responses.table import analyze
-from seqopt.scene._armed import check_postures
+from seqopt.scene.scene import check_postures
 from seqopt.sequence.rules import FREE, Payload, _usual_grips
 from seqopt.sequence.steps import Step, _begin_step
 

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._registry import registered
-from seqopt._showing import Shown
+from seqopt._registry import Shown, registered
 from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine

@@ -7,7 +7,7 @@ this page does not import.
 >>> from seqopt.network.build import build_network
 >>> from seqopt.report import compare, format_comparison
 >>> from seqopt.scene.scene_file import load_scene
->>> from seqopt.study.published import CRITERIA
+>>> from seqopt.study import CRITERIA
 >>> scene, criterion = load_scene("chain:bricks=9"), CRITERIA["worst-ratio-published"]
 >>> comparison = compare(make_engine("compliance", build_network(scene)), criterion)
 >>> comparison.table.loc[["cascade", "overlap_dp"], "gap"].astype(float).round(3).tolist()
@@ -18,7 +18,7 @@ chain 9: 9 bricks, 3 robots
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 from seqopt.report.comparison import Comparison, compare, format_comparison, largest, method_tables
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance

@@ -11,7 +11,7 @@ from contextlib import suppress
 from html import escape
 from typing import TYPE_CHECKING
 
-from seqopt._showing import display
+from seqopt._registry import display
 from seqopt.errors import ExtraError
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem

@@ -18,11 +18,10 @@ from seqopt.report._pages import folder_page, plan_page
 from seqopt.report._regret._measure import check_reference
 from seqopt.report.comparison import Comparison
 from seqopt.report.comparison import compare as compare_builds
-from seqopt.scene._armed import find_postures
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.part import find_scene
 from seqopt.stability.failure_map import BuildProver, find_prover
-from seqopt.study.published import find_criterion
+from seqopt.study import find_criterion
 from seqopt.work.progress import Tell
 from seqopt.workflow import DEFAULTS
 

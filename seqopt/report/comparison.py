@@ -38,13 +38,13 @@ from seqopt.responses.table import (
 )
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS, modified_sequential
+from seqopt.sequence.part import MOST, find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
-from seqopt.study.published import PUBLISHED, published_about, published_plan
+from seqopt.study import PUBLISHED, published_about, published_plan
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}

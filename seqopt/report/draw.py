@@ -23,7 +23,7 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arms._model import PosedArm
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind

@@ -36,8 +36,7 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.sequence.steps import Step
-from seqopt.work._threads import one_thread
-from seqopt.work._workers import hire, map_ordered
+from seqopt.work._workers import hire, map_ordered, one_thread
 from seqopt.work.progress import Progress, Tell
 
 COMPILED = 2e7  # work from which on compiled loops save more than loading them takes

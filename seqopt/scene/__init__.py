@@ -20,7 +20,7 @@ takes.
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 from seqopt.scene.arm import Durations
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene

@@ -26,6 +26,17 @@ def frames(first: Floats, second: Floats) -> Floats:
     return np.stack([first, second, np.cross(first, second)], axis=-2)
 
 
+def as_vectors(points: Floats) -> tuple[Vector, ...]:
+    """Return the rows of an array (k, 3) as tuples."""
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def as_vector(values: Floats) -> Vector:
+    """Return three numbers of an array as a tuple."""
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 Reader = tuple[Callable[[str], Any], str]  # how text is read, or ValueError; what is wanted
 
 

@@ -12,8 +12,18 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._checks import LETTERS, check, density, finite, letters, short, sizes, stiffness
-from seqopt.scene.boxes import _spring_fields, as_vector
+from seqopt.scene._checks import (
+    LETTERS,
+    as_vector,
+    check,
+    density,
+    finite,
+    letters,
+    short,
+    sizes,
+    stiffness,
+)
+from seqopt.scene.boxes import _spring_fields
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,10 @@ import numpy as np
 
 from seqopt._registry import offered
 from seqopt.arrays import Floats, FrozenValue, Ints, Terse, Vector
-from seqopt.errors import ExtraError, SceneError, did_you_mean
+from seqopt.errors import ExtraError, SceneError
 from seqopt.scene._checks import (
     check,
     finite,
-    in_words,
     kind_of,
     length,
     not_negative,
@@ -217,41 +216,13 @@ class Durations(Terse):
     speed: float | None = None
 
     def __post_init__(self) -> None:
-        names = [name for name in _NAMES if name != "speed"]
+        names = [name for name in NAMES if name != "speed"]
         check(self, "durations", **dict.fromkeys(names, _seconds), speed=_speed)
 
     def __str__(self) -> str:
-        said = [(name, getattr(self, name)) for name in _NAMES]
+        said = [(name, getattr(self, name)) for name in NAMES]
         return ",".join(f"{name}={value:g}" for name, value in said if value is not None)
 
 
-_NAMES = tuple(field.name for field in fields(Durations))
+NAMES = tuple(field.name for field in fields(Durations))
 EXAMPLE = "fetch=30,place=10,approach=10,grip=5,release=5"
-
-
-def _durations_in_words(
-    names: Sequence[str], given: Sequence[Durations | None], texts: Sequence[str]
-) -> tuple[Durations | None, ...]:
-    """Return the durations of robots as words say, those before being for all, or as given.
-
-    ``names``: of the robots; ``given``: their own; ``texts``: as `EXAMPLE`, for one robot with its
-    name and a colon before.
-    """
-    out = list(given)
-    for text in texts:
-        name, colon, words = text.partition(":") if ":" in text else ("", "", text)
-        if colon and name not in names:
-            hint = did_you_mean(name, names)
-            raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys(_NAMES, (float, f"a number, as {EXAMPLE}"))
-        said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
-        for index in (i for i, robot in enumerate(names) if robot == name or not colon):
-            before = out[index]
-            lacking = [each for each in _NAMES if each not in said and each != "speed"]
-            if before is None and lacking:
-                raise SceneError(
-                    f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
-                    f"all, as {EXAMPLE}"
-                )
-            out[index] = Durations(**said) if before is None else replace(before, **said)
-    return tuple(out)

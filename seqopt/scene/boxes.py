@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import short, units, whole
+from seqopt.scene._checks import as_vector, as_vectors, short, units, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
@@ -60,17 +60,6 @@ def _spring_fields(
     """Return the fields of a joint or ground end; stiffnesses are N/m, then N m/rad."""
     names = ("position", "along", "across", "translational_stiffness", "rotational_stiffness")
     return dict(zip(names, (*map(as_vector, (position, along, across)), *stiffness), strict=True))
-
-
-def as_vectors(points: Floats) -> tuple[Vector, ...]:
-    """Return the rows of an array (k, 3) as tuples."""
-    return tuple((x, y, z) for x, y, z in points.tolist())
-
-
-def as_vector(values: Floats) -> Vector:
-    """Return three numbers of an array as a tuple."""
-    x, y, z = values.tolist()
-    return x, y, z
 
 
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:

@@ -38,7 +38,7 @@ from seqopt.scene._checks import (
     wholes,
 )
 from seqopt.scene.arm import Arm, Durations
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import Polyhedron, convex_polygon
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -83,31 +83,7 @@ class Load(Terse):
         return self.brick if self.since is None else self.since
 
 
-_STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
-
-
-def _convex_polygon(
-    where: str, corners: Iterable[Iterable[float]]
-) -> tuple[tuple[float, float], ...]:
-    """Return the corners of a convex polygon that has an area, counterclockwise, m."""
-    points = []
-    for corner in rows(where, corners):
-        x, y, _ = vector(f"{where}: a corner", (*rows(f"{where}: a corner", corner), 0.0))
-        points.append((x, y))
-    edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
-    after = [*zip(edges, edges[1:] + edges[:1], strict=True)]
-    turns = [a * d - b * c for (a, b), (c, d) in after]
-    slack = _STRAIGHT * max((a * a + b * b for a, b in edges), default=0.0)
-    angle = math.fsum(
-        math.atan2(turn, a * c + b * d) for turn, ((a, b), (c, d)) in zip(turns, after, strict=True)
-    )
-    if len(points) < 3 or not max(turns) > slack or min(turns) < -slack or angle > 3 * math.pi:
-        raise SceneError(
-            f"{where} is {short(points)}; give three corners or more of a convex polygon, "
-            "counterclockwise"
-        )
-    return tuple(points)
 
 
 @dataclass(frozen=True)
@@ -308,7 +284,7 @@ class Spring(Terse):
         check(self, where, position=vector)
         unit_axes(self, where, "along", "across")
         check(self, where, translational_stiffness=stiffness, rotational_stiffness=stiffness)
-        check(self, where, thickness=length, face=_convex_polygon)
+        check(self, where, thickness=length, face=convex_polygon)
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:

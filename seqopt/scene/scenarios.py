@@ -17,8 +17,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, SceneError
-from seqopt.scene._checks import short, whole_between
-from seqopt.scene.boxes import as_vector
+from seqopt.scene._checks import as_vector, short, whole_between
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 

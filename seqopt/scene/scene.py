@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from seqopt._later import Later
-from seqopt._showing import Shown, display
-from seqopt.arrays import Vector
-from seqopt.errors import SceneError, did_you_mean
+from seqopt._registry import Later, Shown, display
+from seqopt.arrays import Bools, Ints, Vector
+from seqopt.errors import ProblemError, SceneError, did_you_mean
 from seqopt.scene._checks import (
     check,
     kind_of,
@@ -27,8 +27,9 @@ from seqopt.scene._checks import (
     vector,
     wholes,
 )
-from seqopt.scene.arm import Arm, HeldPostures, _durations_in_words, from_arms
+from seqopt.scene.arm import Arm, HeldPostures, from_arms
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
+from seqopt.work.progress import Tell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -350,8 +351,7 @@ class Scene(Shown):
         [10.0, 10.0, 25.0]
         """
         names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
-        found = _durations_in_words(names, own, words)
-        pairs = zip(self.robots, found, strict=True)
+        pairs = zip(self.robots, WORDS.parse_durations(names, own, words), strict=True)
         return self.with_robots(*(replace(robot, durations=each) for robot, each in pairs))
 
     @cached_property
@@ -512,3 +512,69 @@ def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
     where = f"scene {scene.name}: order"
     given = _parse_order(scene, order) if isinstance(order, str) else wholes(where, order)
     return replace(scene, build_order=given)
+
+
+def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | None = None) -> None:
+    """Compute the postures of arms, or read them from a folder, before they are asked for."""
+    if not (cache is None or (isinstance(cache, str | Path) and str(cache))):
+        raise ProblemError(f"cache is {cache!r}; give the path of a folder")
+    if scene.has_arms:
+        from_arms("find_postures")(scene, cache, tell)
+
+
+def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
+    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
+
+    That of an arm is in reach if a posture of it is possible when the brick is placed.
+    """
+    own = scene.within_reach(robot)
+    if robot.arm is None:
+        return own
+    until = from_arms("permits")(scene).until[scene.robots.index(robot)]
+    return tuple(
+        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
+        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
+    )
+
+
+def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
+    """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
+    nodes = tuple(node for brick in within_reach(scene, robot)[:bricks] for node in brick)
+    if robot.arm is None:
+        return nodes
+    until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
+    place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
+    return tuple(node for node in nodes if until[place[node]] > bricks)
+
+
+def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
+    """Return which states (n,) of a scene with arms have postures that go together.
+
+    ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
+    none above 0 is a free robot.
+    """
+    out: Bools = from_arms("permits")(scene).allowed(bricks, held)
+    return out
+
+
+class _NoRules:
+    """Which states arms can be in, by a second way for the judge: all, of robots without any."""
+
+    def allow(self, bricks: int, states: Ints) -> Bools:
+        """Return which states (n, c) of places have postures that go together, (n,)."""
+        return np.ones(len(states), dtype=bool)
+
+
+def posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
+    """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
+    rules: _NoRules = from_arms("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    return rules
+
+
+def check_postures(scene: Scene, steps: Sequence[object]) -> None:
+    """Raise a `StepError` if arms have no postures that go together in a step.
+
+    Or if the compliance of their grips is not that of their joints.
+    """
+    if scene.has_arms:
+        from_arms("check_postures")(scene, steps)

@@ -21,15 +21,16 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text, write_text
+from seqopt._registry import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
 from seqopt.scene.arm import Arm, Durations
-from seqopt.scene.boxes import overlapping
 from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
+BOXES = Later("seqopt.scene.boxes")  # where a file is checked
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
@@ -81,7 +82,7 @@ def _find_overlapping(scene: Scene) -> Iterator[str]:
     solid = [b for b in scene.bricks if b.shape is None or b.name not in beams]
     lines = [
         f"bricks {a} and {b} interpenetrate by {1e3 * depth:.3g} mm; move them apart"
-        for a, b, depth in overlapping(solid)
+        for a, b, depth in BOXES.overlapping(solid)
         if frozenset((a, b)) not in checked
     ]
     yield from lines[:_SHOWN]

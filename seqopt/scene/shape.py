@@ -1,20 +1,22 @@
-"""Closed polyhedra, checked: volume, centroid and longest axis of any block; and open surfaces."""
+"""Closed polyhedra, checked: volume, centroid and longest axis of any block; and polygons."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
+from seqopt.arrays import Floats, Ints, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import frames, rows, settle, short, vector, wholes
 
 _Corner = TypeVar("_Corner")
+_STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
 _EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
 _NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
@@ -131,14 +133,6 @@ class Polyhedron:
         return (0.0 - x, 0.0 - y, 0.0 - z), (x, y, z)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Surface(FrozenValue):
-    """A surface that is not closed, as of a support; both of its sides are faces."""
-
-    points: Floats  # (V, 3); m
-    faces: tuple[tuple[int, ...], ...]  # places among the vertices
-
-
 def edges(face: Sequence[_Corner]) -> Iterator[tuple[_Corner, _Corner]]:
     """Return the corners of a face, each with the next one, once around."""
     return zip(face, (*face[1:], *face[:1]), strict=True)
@@ -169,6 +163,29 @@ def bend(corners: Floats) -> float:
     if not size > 0:
         return np.inf
     return float(np.abs((corners - corners.mean(axis=0)) @ normal).max() / size)
+
+
+def convex_polygon(
+    where: str, corners: Iterable[Iterable[float]]
+) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a convex polygon that has an area, counterclockwise, m."""
+    points = []
+    for corner in rows(where, corners):
+        x, y, _ = vector(f"{where}: a corner", (*rows(f"{where}: a corner", corner), 0.0))
+        points.append((x, y))
+    edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
+    after = [*zip(edges, edges[1:] + edges[:1], strict=True)]
+    turns = [a * d - b * c for (a, b), (c, d) in after]
+    slack = _STRAIGHT * max((a * a + b * b for a, b in edges), default=0.0)
+    angle = math.fsum(
+        math.atan2(turn, a * c + b * d) for turn, ((a, b), (c, d)) in zip(turns, after, strict=True)
+    )
+    if len(points) < 3 or not max(turns) > slack or min(turns) < -slack or angle > 3 * math.pi:
+        raise SceneError(
+            f"{where} is {short(points)}; give three corners or more of a convex polygon, "
+            "counterclockwise"
+        )
+    return tuple(points)
 
 
 def clip(polygon: Floats, other: Floats) -> Floats:

@@ -16,9 +16,8 @@ import numpy as np
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
-from seqopt.scene._armed import reachable, within_reach
 from seqopt.scene.parts import Brick, Robot, Side
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, reachable, within_reach
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import groupby
@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
-from seqopt._later import Later
-from seqopt._showing import Shown, display
+from seqopt._registry import Later, Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import GROUND, Network
@@ -259,14 +258,6 @@ class Schedule(Shown):
         """Draw the grips over some steps, a lane per robot; those to be chosen are hatched."""
         figure: Figure = display(Schedule, "gantt")(self.scene, self.steps, None, (first, last))
         return figure
-
-    @cached_property
-    def steps_of(self) -> Mapping[tuple[int, ...], tuple[OpenStep, ...]]:
-        """The steps by the moves that are open in them, in order."""
-        found: dict[tuple[int, ...], list[OpenStep]] = {}
-        for step in self.steps:
-            found.setdefault(step.moves, []).append(step)
-        return {moves: tuple(steps) for moves, steps in found.items()}
 
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked sequence in which every move takes the node chosen for it."""

@@ -6,20 +6,18 @@ import csv
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from seqopt._files import Row, harmless, read_table, read_text
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import StepError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence.methods import SCHEDULES, open_schedule, robot_loop
-from seqopt.sequence.rules import FREE
+from seqopt.scene.scene import Scene
+from seqopt.sequence.methods import open_schedule
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
-from seqopt.sequence.steps import Site, Step, StepKind, _check_state, _check_step
+from seqopt.sequence.steps import Step, StepKind, _check_state, _check_step
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -177,7 +175,6 @@ def _integer(cell: str, where: str, wanted: str = "a whole number") -> int:
 
 
 _MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
-MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
 
 def read_schedule(where: Network | Scene, path: Path) -> Schedule:
@@ -254,85 +251,3 @@ def schedule_text(schedule: Schedule) -> str:
     writer.writerow(["step", "type", "bricks", *map(harmless, names)])
     writer.writerows([s.number, s.kind.value, s.bricks, *s.grips] for s in schedule.steps)
     return out.getvalue()
-
-
-def find_schedule(
-    network: Network, schedule: Schedule | Path | str | None = None, robots: Sequence[str] = ()
-) -> Schedule:
-    """Return a schedule by name, from a file, or unchanged; by default the loop of all robots."""
-    if schedule is None:
-        return robot_loop(network, robots or min(len(network.scene.robots), MOST))
-    if isinstance(schedule, str) and schedule in SCHEDULES:
-        return SCHEDULES[schedule](network, robots)
-    if robots:
-        raise StepError(
-            f"robots {', '.join(robots)}: only a schedule by name takes them "
-            f"({', '.join(SCHEDULES)}); one of your own says itself who holds; leave them out"
-        )
-    if isinstance(schedule, Schedule):
-        if schedule.scene != network.scene:
-            raise StepError(
-                f"schedule {schedule.method}: it is of scene {schedule.scene.name}, not of this "
-                f"{network.scene.name}; make it from the network of this scene"
-            )
-        return schedule
-    known = f"{', '.join(SCHEDULES)}, or a CSV file, or {FREE}"
-    if not isinstance(schedule, str | Path):
-        raise StepError(f"schedule {short(schedule)}: give a Schedule, or one of {known}")
-    path = Path(schedule)
-    if isinstance(schedule, str) and not path.suffix and not path.exists():
-        raise StepError(
-            f"schedule {schedule!r} does not exist{did_you_mean(schedule, (*SCHEDULES, FREE))}; "
-            f"give one of {known}"
-        )
-    return read_schedule(network, path)
-
-
-def without(
-    scene: Scene, site: Site, lost: Sequence[str] = (), missing: Sequence[int] = ()
-) -> tuple[Scene, Site]:
-    """Return scene and site without robots that are lost, and without bricks that are missing.
-
-    A lost robot releases its node and is not used again. A missing brick that stood is placed
-    again next; a later one waits for all bricks that are not connected through it. Grips on
-    missing bricks are released.
-    """
-    names = [robot.name for robot in scene.robots]
-    for name in lost:
-        if name not in names:
-            raise StepError(f"robot {name} does not exist; give some of {', '.join(names)}")
-    for brick in missing:
-        if brick not in scene.build_order:
-            raise StepError(f"brick {brick} does not exist; name a brick of scene {scene.name}")
-    stood, later = scene.build_order[: site.bricks], scene.build_order[site.bricks :]
-    stands = tuple(name for name in stood if name not in missing)
-    again = tuple(name for name in stood if name in missing)
-    last = tuple(name for name in later if name in missing)
-    rest = tuple(name for name in later if name not in missing)
-    held = tuple(
-        None if name in lost or (node and scene.brick_of_node[node].name in again) else node
-        for name, node in zip(names, site.holds(scene), strict=True)
-    )
-    before, after = _while_missing(scene, {*stands, *again}, rest)
-    order = (*stands, *again, *before, *last, *after)
-    made = scene if order == scene.build_order else in_order(scene, order)
-    ages = tuple(a for n, a in zip(stood, site.ages, strict=False) if n not in missing)
-    return made, replace(site, bricks=len(stands), grips=held, ages=ages)
-
-
-def _while_missing(
-    scene: Scene, stand: set[int], rest: Sequence[int]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return bricks tied to the standing part or the ground, and those that wait."""
-    beside: dict[int, set[int]] = {name: set() for name in scene.build_order}
-    for first, second in (joint.bricks for joint in scene.joints):
-        beside[first].add(second)
-        beside[second].add(first)
-    grounded = {ground.brick for ground in scene.grounds if ground.closes_with is None}
-    placed, waiting = list[int](), list(rest)
-    while True:
-        tied = next((b for b in waiting if b in grounded or beside[b] & {*stand, *placed}), None)
-        if tied is None:
-            return tuple(placed), tuple(waiting)
-        placed.append(tied)
-        waiting.remove(tied)

@@ -11,10 +11,9 @@ from enum import Enum
 from numbers import Integral
 
 from seqopt.errors import StepError
-from seqopt.scene._armed import reachable
 from seqopt.scene._checks import finite, settle, short
 from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, reachable
 
 Grips = tuple[int | None, ...]
 

@@ -55,8 +55,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.work._threads import one_thread
-from seqopt.work._workers import hire, map_ordered
+from seqopt.work._workers import hire, map_ordered, one_thread
 from seqopt.work.progress import Tell, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program

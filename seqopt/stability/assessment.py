@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._showing import Shown
+from seqopt._registry import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import step_assembly

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from seqopt._showing import display
+from seqopt._registry import display
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies
 from seqopt.contact.mortar import (

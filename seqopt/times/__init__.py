@@ -15,7 +15,7 @@ after the other:
 
 from typing import TYPE_CHECKING
 
-from seqopt._later import later
+from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.times._build import times

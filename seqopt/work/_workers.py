@@ -1,4 +1,4 @@
-"""One function over many tasks; results in their order.
+"""One function over many tasks; results in their order; and threads of linear algebra.
 
 The number of tasks under way is limited, so that neither they nor their results pile up. What a
 task raises is raised for the first task that does, as in a loop.
@@ -16,19 +16,32 @@ import signal
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache
 from itertools import islice
+from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.linalg import blas, lapack
+from threadpoolctl import ThreadpoolController
 
-from seqopt.errors import WorkerError, message_of
+from seqopt.errors import MemoryShortError, WorkerError, message_of
 
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
 _MEMORY = Path("/proc/meminfo")
 _OWN = Path("/proc/self/statm")
 _GROUPS = (
@@ -56,6 +69,56 @@ def free_memory() -> float:
             pages = int(_OWN.read_text("ascii").split()[0]) if _OWN.exists() else 0
             free = min(free, float(limit_of_own - pages * resource.getpagesize()))
     return max(free, 0.0)
+
+
+_BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Return a context in which BLAS uses one thread; on leaving, it uses as many as before.
+
+    The matrices of a partial structure are small enough for one core. Threads that share them spend
+    their time waiting, without end where another process wants the second core. Entered for a whole
+    operator or pass of grip sets, it costs some 10 µs.
+    """
+    limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+@cache
+def cores() -> int:
+    """Return on how many cores this process may work: one where it is one of several workers."""
+    if parent_process() is not None:
+        return 1
+    known = getattr(os, "sched_getaffinity", None)  # not everywhere
+    return len(known(0)) if known else os.cpu_count() or 1
+
+
+def in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
+    """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
+    first, *others = tasks
+    if not others:
+        return [function(first)]
+    with ThreadPoolExecutor(len(others)) as pool:
+        found = pool.map(function, others)  # begun at once
+        return [function(first), *found]
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
+    free = free_memory()
+    if free < _BUFFERS:
+        raise MemoryShortError(
+            f"linear algebra takes buffers of {_BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
+            "free; raise the limit"
+        )
+    found = ThreadpoolController()
+    with found.limit(limits=1, user_api="blas"):
+        some = np.eye(200)  # large enough for its product and factors to need them
+        _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
+        _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
+    return found
 
 
 class _Processes(ProcessPoolExecutor):
@@ -170,8 +233,6 @@ def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
             _KEPT.reset(before)
 
 
-_Task = TypeVar("_Task")
-_Result = TypeVar("_Result")
 _UNDER_WAY = 4  # tasks dispatched or answered but not taken, for every worker
 _PATIENCE = 1.0  # s without an answer, after which workers are looked after
 

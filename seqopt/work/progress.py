@@ -1,15 +1,18 @@
-"""How far a computation is, and how long it will still take."""
+"""How far a computation is, how long it will still take, and what ends it early."""
 
 from __future__ import annotations
 
+import _thread
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import TypeAlias, TypeVar
 
-from seqopt._interrupts import ending
 from seqopt.errors import TimeUpError
 
 _QUIET = 1.0  # s after which a computation says how far it is
@@ -104,6 +107,86 @@ def duration(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+_ENDS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+
+
+@contextmanager
+def answered(told: Callable[[], object]) -> Iterator[None]:
+    """Answer the first termination signal by a call; a second one is handled as before.
+
+    Signals with foreign handlers are left to these. The call runs between two instructions of the
+    main thread, and should only set a flag.
+    """
+    mine = threading.current_thread() is threading.main_thread()
+    numbers = [n for n in _ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
+
+    def give_back() -> None:
+        for number in numbers:
+            signal.signal(number, signal.default_int_handler)
+
+    def note(_: int, __: FrameType | None) -> None:
+        give_back()
+        told()
+
+    try:
+        for number in numbers:
+            signal.signal(number, note)
+        yield
+    finally:
+        give_back()
+
+
+def interrupt_main() -> None:
+    """Interrupt the main thread like ctrl-C, from any other thread, also while it waits."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
+
+
+@contextmanager
+def ending(seconds: float) -> Iterator[None]:
+    """Raise `TimeoutError` between two instructions of a block that exceeds its time limit.
+
+    In the main thread only; in others there is no limit.
+    """
+    if seconds <= 0:
+        raise TimeoutError
+    if math.isinf(seconds) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def end() -> None:
+        over.set()
+        interrupt_main()
+
+    def end_only(*_: object) -> None:
+        if over.is_set():
+            raise KeyboardInterrupt
+
+    timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
+    timer.daemon = True
+    if before == signal.SIG_IGN:  # as in a background job, where only the end is heard
+        signal.signal(signal.SIGINT, end_only)
+    try:
+        timer.start()
+        yield
+        timer.cancel()
+        timer.join()  # an end that is on its way comes now, and not later
+    except KeyboardInterrupt:
+        if not over.is_set():
+            raise
+        raise TimeoutError from None
+    finally:
+        if before == signal.SIG_IGN:
+            signal.signal(signal.SIGINT, before)
+        timer.cancel()
 
 
 _Result = TypeVar("_Result")

@@ -27,7 +27,7 @@ from seqopt.sequence.schedule import OpenGrip, thin
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
-from seqopt.study.published import CRITERIA, EQUATIONS
+from seqopt.study import CRITERIA, EQUATIONS
 from tests.brute_force import FOUR, ONES, allowed, distance, whole_graph
 from tests.builders import Counting, small_arch
 

@@ -26,7 +26,7 @@ from seqopt.scene.scene_file import ABOUT, load_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 from tests.blocks import with_shapes
 from tests.builders import apart, block, hinged, largest_difference, scaled, six_bricks
 from tests.direct_solve import solve_dense

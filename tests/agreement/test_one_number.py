@@ -26,7 +26,7 @@ from seqopt.problem.problem import Aim
 from seqopt.responses.quantities import RESPONSES
 from seqopt.sequence import methods as three_robots
 from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from tests.brute_force import ONES
 from tests.builders import small_arch
 

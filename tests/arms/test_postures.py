@@ -17,7 +17,7 @@ from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
 from seqopt.scene.scene import in_order
-from seqopt.sequence._rule_space import StateRows
+from seqopt.sequence._space import StateRows
 from tests.arms.scenes import beside, two_arms
 
 pytest.importorskip("pinocchio")

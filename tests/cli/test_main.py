@@ -19,7 +19,7 @@ from seqopt.responses._faults import _fault
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.methods import sequential
-from seqopt.study.published import printed_steps
+from seqopt.study import printed_steps
 from tests.builders import anywhere, from_both_ends, hinged
 from tests.commands import beside_models, command
 from tests.commands import command as run

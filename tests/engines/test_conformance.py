@@ -19,7 +19,7 @@ from seqopt.responses.table import step_fields
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import sequential
-from seqopt.study.published import STUDY_BED
+from seqopt.study import STUDY_BED
 from tests.builders import from_both_sides, largest_difference, six_bricks
 
 

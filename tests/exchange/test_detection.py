@@ -18,7 +18,7 @@ from seqopt.exchange._mesh_files import read_obj
 from seqopt.exchange._meshes import repair_shape
 from seqopt.exchange.contacts import face_ground, face_joint, flat_face, touching_faces
 from seqopt.exchange.imports import import_scene, read_content
-from seqopt.scene.boxes import as_vectors
+from seqopt.scene._checks import as_vectors
 from seqopt.scene.library.common import MASONRY, _touching_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron

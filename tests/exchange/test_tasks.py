@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
 from seqopt._files import write_text
+from seqopt.arms._plan_postures import PlanPostures
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._content import Given
 from seqopt.exchange._grip_frames import hold
@@ -22,7 +23,6 @@ from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.scene._armed import PlanPostures
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence

@@ -27,7 +27,7 @@ from experiments.harness.results import RESULTS
 from experiments.harness.scenes import barrel_vault
 from experiments.placement.parts.staged import spring_maps
 from seqopt.network.build import build_network
-from seqopt.study.published import printed
+from seqopt.study import printed
 
 pytestmark = pytest.mark.slow
 

@@ -27,7 +27,7 @@ from experiments.figures import PICTURES
 from experiments.harness.claim import claims, find_claim
 from experiments.harness.results import FIGURES, RESULTS
 from seqopt.report._style import DPI, WIDTH, dress, looks, new_figure, styled
-from seqopt.study.published import printed_steps
+from seqopt.study import printed_steps
 from tests.pictures import flaws, texts
 
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from seqopt._interrupts import answered, ending
+from seqopt.work.progress import answered, ending
 
 
 def test_a_first_interrupt_is_a_call_and_a_second_one_ends():

@@ -33,7 +33,7 @@ from seqopt.graph.formulation import (
 )
 from seqopt.graph.graph import Graph
 from seqopt.problem.problem import Aim
-from seqopt.study.published import CRITERIA, EQUATIONS
+from seqopt.study import CRITERIA, EQUATIONS
 from tests.builders import small_arch
 from tests.layered import Costs, answer, of_layers
 from tests.strategies import budgeted, problems

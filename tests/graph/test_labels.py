@@ -20,7 +20,7 @@ from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from tests.layered import of_layers
 from tests.random_graphs import graphs, simple_paths
 

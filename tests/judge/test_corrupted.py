@@ -19,8 +19,7 @@ from seqopt.graph.states.explored import bisected
 from seqopt.graph.states.states import States
 from seqopt.problem import Amount, Filter, filters
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
-from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence._space import FreeSpace, ScheduleSpace
 from tests.brute_force import ONES
 from tests.builders import small_arch
 

@@ -22,7 +22,7 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.sequence.steps import StepKind
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from tests.builders import first, small_arch
 from tests.layered import Costs, answer, changed, path_of, told
 from tests.plain_rules import PlainBook

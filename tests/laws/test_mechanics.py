@@ -26,7 +26,7 @@ from seqopt.responses.quantities import responses_of
 from seqopt.scene.parts import Anywhere, Robot, Sphere
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
+from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import about_vertical, moved, rescaled, scaled, solve
 from tests.strategies import arches, both_sided, free_builds, states, walls
 

@@ -25,7 +25,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from tests.builders import six_bricks
 from tests.layered import Costs, answer
 

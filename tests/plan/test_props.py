@@ -18,8 +18,8 @@ from seqopt.judge._step_checks import check_props, props_that_hold
 from seqopt.plan.pose import graph_of
 from seqopt.plan.replan import compared, goes_on
 from seqopt.responses.quantities import PROP_EXCESS
+from seqopt.sequence.part import without
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule_file import without
 from seqopt.sequence.steps import Site
 from tests.brute_force import ONES, best_values
 from tests.builders import small_arch

@@ -21,7 +21,7 @@ from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import NEVER, SceneFacts, crown
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
+from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import anywhere, far_reaching, rescaled, six_bricks, small_arch
 from tests.strategies import arches, problems
 

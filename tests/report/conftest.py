@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from seqopt.report.comparison import compare
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 
 
 @pytest.fixture(scope="session")

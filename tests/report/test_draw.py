@@ -14,7 +14,7 @@ from seqopt.network.build import build_network
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
-from seqopt.study.published import CRITERIA, EQUATIONS
+from seqopt.study import CRITERIA, EQUATIONS
 from tests.blocks import with_shapes
 from tests.builders import six_bricks, small_arch
 

@@ -14,7 +14,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.plan.pose import graph_of, pose
 from seqopt.responses import _grip_sets as batches
 from seqopt.responses._grip_sets import HERE, Resources
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from seqopt.work._workers import keep
 
 distributed = pytest.importorskip("distributed", reason="extra dask")

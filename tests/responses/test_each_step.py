@@ -35,7 +35,7 @@ from seqopt.responses.table import (
 )
 from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.study.published import EQUATIONS
+from seqopt.study import EQUATIONS
 from seqopt.workflow import optimize
 from tests.builders import six_bricks
 

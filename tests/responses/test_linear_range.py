@@ -20,7 +20,7 @@ from seqopt.responses.table import _STRAIN, LinearRange, analyze, support_column
 from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 from tests.builders import from_both_sides, small_arch
 
 WORDS = "arch:span=3,rise=1.2,bricks=21,density=2000,dimensions=0.18x0.1x0.06"

@@ -24,7 +24,7 @@ from seqopt.responses.quantities import _excess_of
 from seqopt.scene.parts import Joint
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 from tests.builders import anywhere, block, from_both_sides, largest_difference, small_arch
 from tests.strategies import arches
 

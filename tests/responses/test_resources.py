@@ -32,7 +32,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import sequential, three_robot_loop
-from seqopt.study.published import EQUATIONS, WORST_RATIO
+from seqopt.study import EQUATIONS, WORST_RATIO
 from seqopt.work._workers import keep
 from tests.builders import six_bricks
 

@@ -12,14 +12,8 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import (
-    _find_overlaps,
-    _separations,
-    as_vectors,
-    block_brick,
-    overlapping,
-    require_apart,
-)
+from seqopt.scene._checks import as_vectors
+from seqopt.scene.boxes import _find_overlaps, _separations, block_brick, overlapping, require_apart
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism

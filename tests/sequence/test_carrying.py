@@ -16,8 +16,7 @@ from seqopt.plan.front import find_front
 from seqopt.plan.pose import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
-from seqopt.sequence._rule_check import check_carried, too_heavy
-from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.rules import FreeRules, check_carried, too_heavy
 from seqopt.sequence.schedule import can_carry, loads
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, best_values

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.build import build_network
-from seqopt.sequence._rule_space import free_space, sort_robots
+from seqopt.sequence._space import free_space
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import small_arch
@@ -59,11 +59,11 @@ def test_further_robots_are_mobile():
 
 def test_robots_of_one_kind_are_found():
     network = build_network(with_robots(small_arch(5), 5))
-    kinds = sort_robots(network, FreeRules())
+    kinds = free_space(network, FreeRules()).kinds
     assert max(len(kind.robots) for kind in kinds) >= 3
-    apart = sort_robots(network, FreeRules(placers=("rob3",)))
+    apart = free_space(network, FreeRules(placers=("rob3",))).kinds
     assert len(apart) == len(kinds) + 1
-    capped = sort_robots(network, FreeRules(), {"rob4": 100.0})
+    capped = free_space(network, FreeRules(), {"rob4": 100.0}).kinds
     assert len(capped) == len(kinds) + 1
 
 
@@ -110,7 +110,7 @@ def all_of_space(space):
 
 def all_of_book(network, rules):
     """The same by plain rules, one state after the other, robots of one kind as a set."""
-    book, kinds = PlainBook(network, rules), sort_robots(network, rules)
+    book, kinds = PlainBook(network, rules), free_space(network, rules).kinds
 
     def name(bricks, grips, regrips):
         held = tuple(frozenset(grips[r] for r in k.robots if grips[r] is not None) for k in kinds)

@@ -23,7 +23,7 @@ from seqopt.sequence.methods import (
 )
 from seqopt.sequence.schedule import OpenGrip, Schedule, thin
 from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.study.published import EQUATIONS, WEIGHTED, printed
+from seqopt.study import EQUATIONS, WEIGHTED, printed
 from tests.builders import anywhere, small_arch
 
 

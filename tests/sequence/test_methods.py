@@ -24,7 +24,7 @@ from seqopt.sequence.methods import (
 )
 from seqopt.sequence.schedule import OpenGrip, OpenStep, holds, islands
 from seqopt.sequence.steps import StepKind, check_sequence
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 from tests.builders import anywhere, branch, from_both_ends, small_arch
 
 

@@ -18,8 +18,8 @@ from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network
 from seqopt.sequence.methods import SCHEDULES, sequential
+from seqopt.sequence.part import find_schedule
 from seqopt.sequence.schedule_file import (
-    find_schedule,
     parse_plan,
     parse_schedule,
     read_plan,

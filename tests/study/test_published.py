@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from experiments.harness.ranks import rank_choice
 from seqopt.plan.solve import solve
-from seqopt.study.published import published_plan
+from seqopt.study import published_plan
 
 
 def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25):

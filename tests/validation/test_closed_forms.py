@@ -17,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.responses.table import _grips_of
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import METHODS
-from seqopt.study.published import STUDY_BED
+from seqopt.study import STUDY_BED
 from tests.builders import HERE, block
 
 

@@ -12,14 +12,7 @@ from seqopt.plan.pose import pose
 from seqopt.report.comparison import compare
 from seqopt.responses.table import analyze
 from seqopt.sequence.methods import METHODS
-from seqopt.study.published import (
-    CLOSEST,
-    EQUATIONS,
-    as_printed,
-    printed,
-    printed_steps,
-    published_plan,
-)
+from seqopt.study import CLOSEST, EQUATIONS, as_printed, printed, printed_steps, published_plan
 
 FITTED = {"sequential": "Table A.1", "cantilever": "Table A.2"}
 PREDICTED = (0.12, 1.36, 2.82)  # percent, Table B.1, which took no part in the identification

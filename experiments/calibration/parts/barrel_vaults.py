@@ -22,7 +22,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
-from seqopt.study.published import SOURCE, printed
+from seqopt.study import SOURCE, printed
 
 
 @dataclass(frozen=True)

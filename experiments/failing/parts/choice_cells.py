@@ -36,7 +36,7 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.methods import three_robot_loop
-from seqopt.study.published import EQUATIONS, RESOLUTION
+from seqopt.study import EQUATIONS, RESOLUTION
 from tests.layered import Costs, of_layers
 from tests.layered import answer as claimed_answer
 

@@ -31,14 +31,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
-from seqopt.study.published import (
-    EQUATIONS,
-    STUDY_BED,
-    as_printed,
-    printed,
-    printed_steps,
-    published_plan,
-)
+from seqopt.study import EQUATIONS, STUDY_BED, as_printed, printed, printed_steps, published_plan
 
 Rows = Iterator["Row"]
 

@@ -15,7 +15,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
 from seqopt._files import csv_text
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError

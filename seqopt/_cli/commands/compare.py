@@ -18,7 +18,7 @@ from seqopt.report._questions import compare, own_engine
 from seqopt.report.comparison import Comparison, _printed_largest, format_comparison
 from seqopt.responses.table import builds_in_words
 from seqopt.stability.failure_map import find_prover
-from seqopt.study.published import find_criterion
+from seqopt.study import find_criterion
 from seqopt.work.progress import Tell
 from seqopt.workflow import DEFAULTS
 

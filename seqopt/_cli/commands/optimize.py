@@ -13,7 +13,7 @@ from seqopt._cli.outputs import ALWAYS, Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.engines.registry import engine_mortar
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
@@ -24,7 +24,7 @@ from seqopt.responses._tolerance import values_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts, find_prover
-from seqopt.study.published import paper_models
+from seqopt.study import paper_models
 from seqopt.work.progress import Tell
 from seqopt.workflow import Robust, optimize
 

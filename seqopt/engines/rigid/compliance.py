@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import (
     RIGID,
@@ -52,7 +52,7 @@ from seqopt.engines.rigid._operator import (
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work._threads import one_thread
+from seqopt.work._workers import one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes

@@ -17,7 +17,7 @@ from seqopt.problem.criteria import Ranked, RankSum
 from seqopt.problem.requirements import Criterion, state_costs
 
 if TYPE_CHECKING:
-    from seqopt.sequence._rule_space import Candidates
+    from seqopt.sequence._space import Candidates
 
 
 class CandidateCosts:

@@ -15,9 +15,8 @@ from seqopt.graph.states.states import States
 from seqopt.problem.amounts import NONE, STEPS, MoveArrays
 from seqopt.problem.resources import StepArrays
 from seqopt.scene.scene import Order
-from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence import _space as free_space
+from seqopt.sequence._space import FreeSpace, ScheduleSpace
 from seqopt.sequence.steps import Step, _begin_step, check_sequence
 
 

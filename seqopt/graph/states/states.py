@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seqopt._showing import Shown
+from seqopt._registry import Later, Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
@@ -47,7 +47,6 @@ from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.scene._checks import as_float, short
-from seqopt.scene.scenarios import require_alike
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -56,8 +55,7 @@ from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
-    from seqopt.sequence._rule_space import FreeSpace
-    from seqopt.sequence._schedule_space import ScheduleSpace
+    from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
@@ -255,8 +253,7 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
-        from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
+        from seqopt.sequence._space import ScheduleSpace, free_space  # noqa: PLC0415  # candidates need none
 
         network, rules, caps, worlds = self.network, self.rules, self.caps, self.worlds
         if isinstance(rules, Schedule):  # its robots are never alike
@@ -372,7 +369,7 @@ class States(Shown):
     ) -> tuple[StateArrays, Bools]:
         """Return states as amounts and filters see them, and which pass the filters.
 
-        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether single precision
+        ``states`` (n, c): as in `seqopt.sequence._space`; ``rough``: whether single precision
         is enough, except close to a limit. Stability is evaluated later.
         """
         seen = self.seen(level, states, rough=rough)
@@ -713,8 +710,8 @@ def over_scenarios(
             f"aim {sums[0]}: the worst total of scenarios is no total of worst states; give "
             "worst-total, or take worst values"
         )
-    for number, scene in enumerate(scenes, start=1):
-        require_alike(problem.network.scene, scene, number)
+    for number, scene in enumerate(scenes, start=1):  # of a module that others do without
+        Later("seqopt.scene.scenarios").require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
     return _asked(replace(problem, scenarios=engines, over=over))
 

@@ -28,7 +28,6 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import pandas as pd
 
-from seqopt._interrupts import ending
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
@@ -44,13 +43,13 @@ from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import Criterion
 from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
+from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import Stage, Tell
+from seqopt.work.progress import Stage, Tell, ending
 
 TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take

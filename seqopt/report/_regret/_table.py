@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from seqopt._showing import display
+from seqopt._registry import display
 from seqopt.arrays import Bools
 from seqopt.graph.formulation import Finding
 from seqopt.sequence.rules import FREE

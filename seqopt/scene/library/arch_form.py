@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from seqopt._later import Later
+from seqopt._registry import Later
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (

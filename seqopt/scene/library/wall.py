@@ -14,8 +14,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, density, finite, sizes, units, whole_between
-from seqopt.scene.boxes import _spring_fields, as_vector, require_apart
+from seqopt.scene._checks import as_vector, check, density, finite, sizes, units, whole_between
+from seqopt.scene.boxes import _spring_fields, require_apart
 from seqopt.scene.library.arch_form import ArchForm, _first_that_fits, _laid
 from seqopt.scene.library.common import (
     DOWN,

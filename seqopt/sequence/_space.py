@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, pairwise
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,11 +23,10 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
-from seqopt.scene._armed import go_together, within_reach
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, go_together, within_reach
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
-from seqopt.sequence.schedule import can_carry, islands
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried, islands
 from seqopt.sequence.steps import Site, Step, StepKind, _begin_step, check_sequence
 
 
@@ -39,38 +39,6 @@ class RobotKind(FrozenValue):
     newest: Bools  # (2B,); at which they hold a brick when they place it, and as the newest
     places: Bools  # (B,); bricks in build order that they may place or take away: they carry them
     cap: float  # largest force of a grip, N
-
-
-def sort_robots(
-    network: Network,
-    rules: FreeRules,
-    caps: Mapping[str, float] | None = None,
-    *,
-    timed: bool = False,
-    worlds: Sequence[Scene] = (),
-) -> tuple[RobotKind, ...]:
-    """Return the participating robots by kind, in the order of their first robots.
-
-    ``caps``: force limits of grips besides payloads, by robot, N; ``timed``: whether robots of a
-    kind must have equal durations; ``worlds``: scenes of scenarios, with other weights.
-    """
-    scene, kept = network.scene, rules.payload is Payload.KEPT
-    alike: dict[tuple[object, ...], RobotKind] = {}
-    for i in rules.team(scene):
-        robot = scene.robots[i]
-        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
-        newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
-        for k, brick in enumerate(scene.placed if newest is not reach else ()):
-            with suppress(StepError):  # it reaches none
-                newest[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
-        places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
-        places &= not rules.placers or robot.name in rules.placers
-        cap = min(robot.payload if kept else np.inf, (caps or {}).get(robot.name, np.inf))
-        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
-        key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
-        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
-        alike[key] = replace(first, robots=(*first.robots, i))
-    return tuple(alike.values())
 
 
 class Moves(NamedTuple):
@@ -193,14 +161,6 @@ class StateRows(Terse):
         """Return the columns of robots whose grips are open at a level, in the order of moves."""
         return ()
 
-    def candidates(self, level: int) -> Candidates:
-        """Return the choices of the grips that are open at a level."""
-        raise NotImplementedError
-
-    def decided_by(self, level: int) -> Any:
-        """Return the move that decides a level: the last of those that are open in it."""
-        raise NotImplementedError
-
     def held(self, states: Ints) -> Ints:
         """Return the nodes held (n, robots), ascending, zeros of free robots first."""
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
@@ -299,9 +259,8 @@ class FreeSpace(StateRows):
     def may_place(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) allow the next move of a brick, (n,); the first may not."""
         bricks = self.bricks_at(level)
-        if self.rules.begin is None or bricks != self._span[0] or not bricks:
-            return np.ones(len(states), dtype=bool)
-        return self.lawful(bricks, states)
+        begins = self.rules.begin is not None and 0 < bricks == self._span[0]
+        return self.lawful(bricks, states) if begins else np.ones(len(states), dtype=bool)
 
     def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
@@ -397,9 +356,8 @@ class FreeSpace(StateRows):
         begin = _begin_step(self.network.scene, self.rules.begin)
         grips: list[int | None] = [*begin.grips]
         lasts = (begin.grips, self.rules.begin.stays) if self.rules.begin else ()
-        stays = {  # where a robot was last, as a place from 1
-            r: self._place[n] for nodes in lasts for r, n in enumerate(nodes) if n is not None
-        }
+        # where a robot was last, as a place from 1
+        stays = {r: self._place[n] for nodes in lasts for r, n in enumerate(nodes) if n is not None}
         before, out = begin.bricks, list[Step]()
         for level, *entries in states:
             if len(entries) < self.robots or not all(abs(n) < len(numbers) for n in entries):
@@ -454,8 +412,7 @@ class FreeSpace(StateRows):
             taken[np.arange(len(states)), nodes_held] = True
         source, node = np.nonzero(~taken[:, nodes + 1])
         number = nodes[node] + 1
-        new = states[source]
-        way = np.zeros(len(new))
+        new, way = states[source], np.zeros(len(source))
         if self.parks:
             last = -new[:, slot].astype(np.int64)
             way = np.linalg.norm(self._at[last] - self._at[number], axis=1) * (last > 0)
@@ -489,9 +446,7 @@ def _follow(
             if stays.get(robot, 0) in left and len(free) > 1:  # it is seen to stay free
                 left.remove(stays.get(robot, 0))
                 free = [r for r in free if r != robot]
-        robot = free[0]
-        grips[robot] = node
-        stays[robot] = wanted[node]
+        grips[free[0]], stays[free[0]] = node, wanted[node]
     return bool(fresh)
 
 
@@ -538,12 +493,170 @@ def free_space(
     timed: bool = False,
     worlds: Sequence[Scene] = (),
 ) -> FreeSpace:
-    """Return the state space of a free schedule in a scene.
+    """Return the state space of a free schedule, its robots by kind, in the order of their first.
 
     ``caps``: force limits of grips besides payloads, by robot, N; ``parks``: whether states track
-    the positions of free robots, for their travel; ``timed``: whether durations of robots matter;
-    ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
+    the positions of free robots, for their travel; ``timed``: whether robots of a kind must have
+    equal durations; ``worlds``: scenes of scenarios, in which robots must carry their bricks too.
     """
-    kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
-    rules = rules.begun(network.scene)
-    return (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
+    scene, kept = network.scene, rules.payload is Payload.KEPT
+    alike: dict[tuple[object, ...], RobotKind] = {}
+    for i in rules.team(scene):
+        robot = scene.robots[i]
+        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
+        newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
+        for k, brick in enumerate(scene.placed if newest is not reach else ()):
+            with suppress(StepError):  # it reaches none
+                newest[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
+        places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
+        places &= not rules.placers or robot.name in rules.placers
+        cap = min(robot.payload if kept else np.inf, (caps or {}).get(robot.name, np.inf))
+        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
+        key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
+        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
+        alike[key] = replace(first, robots=(*first.robots, i))
+    space = _TakeDownSpace if rules.takes_down else FreeSpace
+    return space(network, rules.begun(scene), tuple(alike.values()), parks)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleSpace(StateRows):
+    """The states of a schedule and the moves between them; a level for every step."""
+
+    network: Network
+    rules: Schedule  # whose open grips are to be chosen
+    caps: Mapping[str, float]  # largest forces of robots' grips, by their names, N
+    parks: bool = False  # free robots stay where they were, for their travel
+    worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
+
+    first = 0  # the level before the first step
+
+    @property
+    def levels(self) -> int:
+        """Number of steps, equal for all builds."""
+        return len(self.rules.steps)
+
+    @property
+    def ends_bare(self) -> bool:
+        """Whether the last step has no grips."""
+        return all(grip is None for grip in self.rules.steps[-1].grips)
+
+    def steps_to_go(self, level: int, states: Ints) -> Floats:
+        """Return the number of steps to the end, (n,)."""
+        return np.full(len(states), float(self.levels - level))
+
+    def bricks_at(self, level: int) -> int:
+        """Return the brick count after a number of steps."""
+        return self.rules.steps[level - 1].bricks if level else 0
+
+    def may_place(self, level: int, states: Ints) -> Bools:
+        """Return from which states the next step is feasible: all, (n,)."""
+        return np.ones(len(states), dtype=bool)
+
+    @cached_property
+    def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
+        """A kind per robot: robots of a schedule are not interchangeable, steps say who carries."""
+        every = np.ones(2 * len(self.network.inner), dtype=bool)
+        caps = [self.caps.get(robot.name, np.inf) for robot in self.network.scene.robots]
+        return tuple(RobotKind((i,), every, every, every[::2], c) for i, c in enumerate(caps))
+
+    @cached_property
+    def _too_heavy(self) -> frozenset[int]:
+        """Numbers of the steps in which a brick exceeds the payload of its robot."""
+        scene = self.network.scene
+        able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
+        every = carried(scene, self.rules.steps)
+        return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
+
+    def start(self) -> Ints:
+        """Return the initial state, (1, robots) int."""
+        return np.zeros((1, self.robots), dtype=np.int32)
+
+    def within(
+        self, level: int, states: Ints, *, regrips: bool = True
+    ) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that stay in a step: there are none."""
+        return ()
+
+    def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves to the next step, and whether they are regrips."""
+        step = self.rules.steps[level]
+        before = self.rules.steps[level - 1].grips if level else (None,) * self.robots
+        after, fresh = states.copy(), []
+        for robot, grip in enumerate(step.grips):
+            if grip is None:
+                after[:, robot] = -np.abs(states[:, robot]) if self.parks else 0
+            elif not isinstance(grip, OpenGrip):
+                after[:, robot] = self._place[grip]
+            elif before[robot] != grip:
+                open_to = self.rules.moves[grip.move].candidates
+                fresh.append((robot, [self._place[node] for node in open_to]))
+        grids = np.meshgrid(*(places for _, places in fresh), indexing="ij")
+        count = prod(len(places) for _, places in fresh)
+        source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
+        for (robot, _), places in zip(fresh, grids, strict=True):
+            after[:, robot] = np.tile(places.ravel(), len(states))
+        kept = self._possible(step, after) & (step.number not in self._too_heavy)
+        source, after = source[kept], after[kept]
+        way, came = np.zeros(len(source)), states[source]
+        if self.parks:
+            gone = (after > 0) & (after != came) & (came != 0)
+            moved = self._at[np.abs(after)] - self._at[np.abs(came)]
+            way = (np.linalg.norm(moved, axis=2) * gone).sum(axis=1)
+        return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
+
+    def _possible(self, step: OpenStep, states: Ints) -> Bools:
+        """Return in which states (n, c) of a step every robot has a node of its own, (n,)."""
+        held = self.held(states)
+        each = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)
+        return np.asarray(each & self.for_arms(step.bricks, states))
+
+    def open_columns(self, level: int) -> tuple[int, ...]:
+        step = self.rules.steps[level - 1] if level else None
+        return () if step is None else tuple(step.grips.index(OpenGrip(m)) for m in step.moves)
+
+    def candidates(self, level: int) -> Candidates:
+        """Return the choices of the grips that are open at a level."""
+        step, columns = self.rules.steps[level - 1], self.open_columns(level)
+        moves = [self.rules.moves[m] for m in step.moves]
+        places = tuple(np.array([self._place[n] for n in move.candidates]) for move in moves)
+        grid = np.meshgrid(*places, indexing="ij")
+        states: Ints = np.tile(self._given(step), (grid[0].size, 1))
+        states[:, columns] = np.stack([each.ravel() for each in grid], axis=1)
+        possible = self._possible(step, states)
+        shaped = possible.reshape(grid[0].shape)
+        return Candidates(columns, places, states[possible], shaped)
+
+    def _given(self, step: OpenStep) -> Ints:
+        """Return the state (1, robots) of a step's given grips, zeros of others."""
+        own = [0 if isinstance(grip, OpenGrip) else self._place.get(grip, 0) for grip in step.grips]
+        return np.array([own], dtype=np.int32)
+
+    def decided_by(self, level: int) -> Move:
+        """Return the move that decides a level: the last of those that are open in it."""
+        return self.rules.moves[self.rules.steps[level - 1].moves[-1]]
+
+    def without_choice(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
+        for level, step in reversed([*enumerate(self.rules.steps, start=1)]):
+            if not step.moves:
+                yield level, self._given(step)
+
+    def ended(self, states: Ints) -> Bools:
+        """Return which states of the last step end the build: all, (n,)."""
+        return np.ones(len(states), dtype=bool)
+
+    def steps(self, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+        """Return the checked steps of states, one for each of the schedule; as of free rules."""
+        rows = np.array([row[1:] for row in states if len(row) == self.robots + 1], dtype=np.int64)
+        if len(rows) != self.levels or [row[0] for row in states] != [*range(1, self.levels + 1)]:
+            raise SolverError("the states are none of this schedule: it has one for every step")
+        if np.abs(rows).max() > 2 * len(self.network.inner):
+            raise SolverError("a state of a schedule holds a node that does not exist")
+        numbers = np.array([None, *self.network.scene.placed_nodes])
+        grips = numbers[rows.clip(min=0)].tolist()
+        steps = [
+            Step(s.number, s.kind, s.bricks, tuple(nodes))
+            for s, nodes in zip(self.rules.steps, grips, strict=True)
+        ]
+        return check_sequence(self.network.scene, steps)
