@@ -21,11 +21,16 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import default_formulation, pose
 from seqopt.plan.solve import _solve_run
-from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.filters import Filter, parse_limits
+from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
-from seqopt.problem.requirements import LARGEST, Criterion, Limit, number_word, split_word
-from seqopt.problem.standing import Standing
+from seqopt.problem.requirements import (
+    LARGEST,
+    Filter,
+    Limit,
+    number_word,
+    parse_limits,
+    split_word,
+)
 from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
@@ -37,6 +42,7 @@ from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Site, StepKind
+from seqopt.stability.standing import Standing
 from seqopt.study.published import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.graph import Graph, Rows, lexicographic
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
-from seqopt.graph.paths import lexicographic
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim

@@ -51,8 +51,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
 from seqopt.graph._labels import CappedSums, LabelSearch, widening
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import ROUNDING, least_sum, tied
+from seqopt.graph.graph import ROUNDING, Graph, least_sum, tied
 
 optimize = Later("scipy.optimize")  # slow to import
 

@@ -21,8 +21,7 @@ incumbent. The beam is widened until no pruned label could lead to a better path
 many labels, or time is over, the least bound of the pruned ones bounds all paths.
 
 Every value belongs to a resource (`Carried`): sums, when robots are free and how old mortar is
-(`formulations.times`), and what problems ask for (`seqopt.problem.resources`). One search serves
-all.
+(`formulations.times`), and what problems ask for (`Resource`). One search serves all.
 """
 
 from __future__ import annotations
@@ -36,9 +35,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, strictly_below
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.graph.graph import Graph, distances, strictly_below
+from seqopt.problem.requirements import Resource, StepArrays
 
 NARROW, WIDER = 256, 16  # labels of a level kept at first, and how many times as many then
 CHUNK = 2_000_000  # arcs of labels that are looked at together

@@ -27,9 +27,8 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
 from seqopt.graph._labels import CappedSums, Sweep, Swept
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import _to_go, least_sum, moves_out, strictly_below, tied
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.graph.graph import Graph, _to_go, least_sum, moves_out, strictly_below, tied
+from seqopt.problem.requirements import Resource, StepArrays
 
 MIXTURES = 80  # multipliers that are tried
 DEAREST = 1e7  # largest multiplier, over what a path costs per unit of a cap

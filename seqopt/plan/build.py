@@ -16,7 +16,6 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
-from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, step_tolerance
 from seqopt.responses.quantities import _props_table
@@ -31,6 +30,7 @@ from seqopt.responses.table import (
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._steps import assess_steps, stability_table, step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
+from seqopt.stability.standing import Standing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,12 +21,12 @@ import numpy as np
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError, did_you_mean, message_of
-from seqopt.problem.requirements import Criterion, state_costs
-from seqopt.problem.standing import MARGINS, StandingSets
+from seqopt.problem.criteria import Criterion, state_costs
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, OFFERED, TOLERANCE
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
+from seqopt.stability.standing import MARGINS, StandingSets
 
 LARGEST = "F_largest"
 STATE_RESPONSES = (*OFFERED, LARGEST, TOLERANCE)

@@ -22,19 +22,17 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, steps_over
-from seqopt.problem.criteria import RankSum, _counts_every_step
-from seqopt.problem.filters import Filter, parse_limits
+from seqopt.problem.criteria import Criterion, RankSum, SceneFacts, _counts_every_step
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
-    Criterion,
+    Filter,
     Limit,
-    SceneFacts,
+    Resource,
     _prop_limits,
     _step_limits,
     as_limits,
+    parse_limits,
 )
-from seqopt.problem.resources import Resource
-from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -42,6 +40,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing
 
 
 class Aim(Enum):

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.harness.layers import best_in_order
-from formulations.states._search import _Totals
+from formulations.on_graph import _Totals
 from seqopt.graph import Graph
+from seqopt.graph._candidates import _branches
 from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
-from seqopt.graph.paths import FAILS, PASSES, _lazy_path
-from seqopt.graph.states.walk import _branches
+from seqopt.graph.graph import FAILS, PASSES, _lazy_path
 from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of

@@ -14,9 +14,9 @@ import pytest
 
 import seqopt
 from formulations.times._labels import InTime
-from seqopt.graph.states._candidates import CandidateCosts
-from seqopt.graph.states.explored import bisected
-from seqopt.graph.states.states import States
+from seqopt.graph._candidates import CandidateCosts
+from seqopt.graph._spaces import bisected
+from seqopt.graph.states import States
 from seqopt.problem import Amount, Filter, filters
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
 from seqopt.sequence._rule_space import FreeSpace
@@ -130,7 +130,7 @@ def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monke
     def wrong(name, exists):
         return tuple(value + shift for value in bisected(name, exists))
 
-    monkeypatch.setattr("seqopt.graph.states.explored.bisected", wrong)
+    monkeypatch.setattr("seqopt.graph._spaces.bisected", wrong)
     assert is_refused(posed(space, amount))
 
 

@@ -15,8 +15,8 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
+from seqopt.graph._candidates import CandidateCosts
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.graph.states._candidates import CandidateCosts
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import (
@@ -28,8 +28,7 @@ from seqopt.problem.amounts import (
     StateArrays,
     judged_by,
 )
-from seqopt.problem.criteria import _counts_every_step
-from seqopt.problem.filters import Filter, filters_of
+from seqopt.problem.criteria import Criterion, _counts_every_step, state_costs
 from seqopt.problem.problem import (
     WORST_PEAK,
     Aim,
@@ -41,9 +40,7 @@ from seqopt.problem.problem import (
     of_states,
     robot_responses,
 )
-from seqopt.problem.requirements import Criterion, Limit, state_costs
-from seqopt.problem.resources import Resource
-from seqopt.problem.standing import Standing, StandingSets
+from seqopt.problem.requirements import Filter, Limit, Resource, filters_of
 from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -54,6 +51,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
+from seqopt.stability.standing import Standing, StandingSets
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
