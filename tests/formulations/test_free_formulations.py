@@ -12,11 +12,11 @@ import pytest
 from hypothesis import example, given, settings
 
 import seqopt
-from formulations._search import ThresholdSearch, path_values
+from formulations._search import ThresholdSearch
 from formulations.on_graph import Choice, on_graph
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
-from seqopt.graph.graph import _on_paths, fewest_moves
+from seqopt.graph.graph import _on_paths, fewest_moves, path_values
 from seqopt.graph.instance import Instance, _Cap, _Target
 from seqopt.graph.space import Explorer, Moves, Space
 from seqopt.graph.states import build_states

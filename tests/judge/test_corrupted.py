@@ -17,7 +17,7 @@ from formulations.times._labels import InTime
 from seqopt.graph._candidates import CandidateCosts
 from seqopt.graph._spaces import bisected
 from seqopt.graph.states import States
-from seqopt.problem import Amount, Filter, filters
+from seqopt.problem import Amount, Filter, requirements
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
 from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
@@ -245,8 +245,8 @@ def corrupt(monkeypatch, problem, kind, change):
         return replace(problem, filters=tuple(map(of_filter, problem.filters)))
     if kind in ("limit", "payload"):
         name = f"_{kind}s_filter" if kind == "payload" else f"_{kind}_filter"
-        own = getattr(filters, name)
-        monkeypatch.setattr(filters, name, lambda *of: of_filter(own(*of)))
+        own = getattr(requirements, name)
+        monkeypatch.setattr(requirements, name, lambda *of: of_filter(own(*of)))
     elif kind == "stands":
         of_method(States, "stand", lambda self, level: self.space.bricks_at(level))
         monkeypatch.setattr(States, "recalled", lambda self, level, states: np.zeros(len(states)))
