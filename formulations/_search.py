@@ -442,7 +442,7 @@ def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Sol
 def unproven(found: Solution, wide: Explorer, proven: float) -> Solution:
     """Return the incumbent with the bound of the first goal from thresholds and reached levels."""
     bound = proven
-    if not wide.peaks[0] and wide.level:
+    if not wide.space.peaks[0] and wide.level:
         graph, states = wide.graph()
         least = distances(graph, graph.amounts[:, 0])
         level = np.repeat([level for level, *_ in states], [len(rows) for *_, rows in states])

@@ -34,7 +34,7 @@ from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
-from seqopt.graph._labels import LabelSearch, SummedLabels, widening
+from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
 from seqopt.graph._spaces import build_space, explore
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
 from seqopt.graph.graph import (
@@ -230,8 +230,8 @@ def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch)
     best = by_weights(graph, aim, cheapest, watch)
     if watch.over or best.bound >= best.value - CLOSE * abs(best.value):
         return best._replace(bound=min(best.bound, best.value))
-    growth = _Totals(graph, aim, best.weights)  # labels close the gap that weights leave
-    known = LabelSearch(None, best.value, best.bound)
+    growth = Joint(graph, [_Totals(graph, aim, best.weights)])
+    known = LabelSearch(None, best.value, best.bound)  # labels close the gap that weights leave
     found = widening(growth, np.zeros(0), known, watch, LABELS)
     path = best.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
     return LeastTotal(path, found.cost, found.bound, best.weights)
@@ -260,25 +260,24 @@ def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) 
     return best._replace(bound=bound, weights=weights)
 
 
-class _Totals(SummedLabels):
-    """Labels of the totals of all scenarios, bounded by weights (S,), and by single scenarios."""
+class _Totals(Sums):
+    """The totals of all scenarios, bounded by weights (S,), and by single scenarios."""
 
     def __init__(self, graph: Graph, aim: RobustAim, weights: Floats) -> None:
-        super().__init__(graph, graph.amounts)
         scenarios, self._aim = len(weights), aim
         single = np.eye(scenarios if aim.most(scenarios) >= 1 else 0, scenarios)
         self._weights = np.vstack([weights, single])
         left = [distances(graph, graph.amounts @ own, back=True) for own in self._weights]
-        self._left = np.column_stack(left)
+        super().__init__(graph.amounts, np.array([np.inf]), np.column_stack(left))
 
-    def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return a lower bound of the aim by totals of paths."""
-        weighed = taken @ self._weights.T + self._left[state]
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        """Return a lower bound of the aim by totals of paths, (N, 1)."""
+        weighed = values @ self._weights.T + self._left[state]
         return np.asarray(weighed.max(axis=1, keepdims=True))
 
-    def values(self, taken: Floats, _: int) -> Floats:
-        """Return the aim of totals."""
-        return self._aim.each(taken)
+    def totals(self, values: Floats) -> Floats:
+        """Return the aim of totals, (N, 1)."""
+        return self._aim.each(values)[:, None]
 
 
 def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:

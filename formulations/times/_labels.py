@@ -223,7 +223,7 @@ class Carrying:
         if self.steps is not None:
             own += [Asked(each, self.steps.only(moves)) for each in self.asked]
         arcs = graph.source[moves].astype(np.int64), graph.target[moves].astype(np.int64)
-        return Joint(graph, self.levels, arcs, own)
+        return Joint(graph, own, self.levels, arcs, look_back=len(moves))
 
     def sweep(
         self,

@@ -1,8 +1,11 @@
-"""A build as a graph: states, moves between them, and amounts of every move, as arrays.
+"""A build as a graph of states and moves, as arrays; best paths through it, and their lower bounds.
 
-In time, a path through states says which kind of robot takes a grip or lets go. Which of its robots
-that are free acts is open, and so is when. A *label* of a state says when the last step ended, and
-of every column whose robot is free since when it is. An *act* is a move with the column that acts.
+Best paths are found goal after goal by scipy.sparse.csgraph. Bounds of all paths come by weak
+duality, checked with arithmetic alone. A sum is bounded by potentials: no move leads to a state by
+less than the difference of both states' potentials, so that no path takes less than the end's. A
+worst amount is bounded by a cut: every move that leaves a set of states, with the start among them
+and no end, takes at least as much. Potentials and sets come from wherever they may; only the
+inequalities count.
 """
 
 from __future__ import annotations
@@ -86,6 +89,11 @@ class Graph(FrozenValue):
         """How many states there are."""
         return len(self.ends)
 
+    @property
+    def goals(self) -> int:
+        """Number of columns that are minimized, those with caps left out."""
+        return len(self.peaks) - len(self.caps)
+
     def __repr__(self) -> str:
         return f"<Graph: {self.states} states, {len(self.source)} moves, {len(self.peaks)} goals>"
 
@@ -93,18 +101,13 @@ class Graph(FrozenValue):
         """Return the graph with some of its moves, (m,) bool; all its states stay."""
         if kept.all():
             return self
-        alone = None if self.alone is None else self.alone[kept]
-        return self._with(
-            source=self.source[kept],
-            target=self.target[kept],
-            amounts=self.amounts[kept],
-            alone=alone,
-        )
+        names = ("source", "target", "amounts") + ("alone",) * (self.alone is not None)
+        return self._with(**{name: getattr(self, name)[kept] for name in names})
 
     def bare(self, goal: int, states: Bools) -> Graph:
-        """Return the moves from some states, (n,) bool, with the amounts of one goal alone.
+        """Return the subgraph of states (n,), the start among them, with the amounts of one goal.
 
-        They lead to no others. States are numbered anew, in order; the start is one of them.
+        States are numbered anew, in order; no move leads to others.
         """
         number, kept = np.cumsum(states, dtype=np.int32) - 1, states[self.source]
         return self._with(
@@ -116,11 +119,6 @@ class Graph(FrozenValue):
             caps=(),
             alone=None,
         )
-
-    @property
-    def goals(self) -> int:
-        """Number of columns that are minimized, those with caps left out."""
-        return len(self.peaks) - len(self.caps)
 
     def moves_from(self, state: int) -> slice:
         """Return which moves lead from a state."""
@@ -277,19 +275,12 @@ def _on_paths(graph: Graph) -> Bools:
 
 
 class Contracted(NamedTuple):
-    """A graph whose moves are decisions: each with the forced moves behind it.
+    """A graph whose moves are decisions, each with the forced moves behind it.
 
-    Attributes
-    ----------
-    graph : Graph
-        A state for the start and for what decisions lead to.
-    kept : (n,) int
-        Which states of the whole graph these are: the next with several successors; where
-        decisions of one state lead to the same one, those that they enter first.
-    enters : (m,) int
-        The state of the whole graph that each move enters first.
-    after : (N,) int
-        Of every state of the whole graph the successor, where that is forced; else itself.
+    ``kept`` (n,): which states of the whole graph its states are: the start, and the next ones with
+    several successors; where decisions of one state lead to the same one, those that they enter
+    first. ``enters`` (m,): the state of the whole graph that each move enters first; ``after``
+    (N,): of every state of the whole graph the successor, where that is forced; else itself.
     """
 
     graph: Graph
@@ -299,15 +290,13 @@ class Contracted(NamedTuple):
 
     def expanded(self, path: Sequence[int]) -> tuple[int, ...]:
         """Return a path of decisions with all states that it passes in the whole graph."""
-        first = self._chain(0)[1:] if path else []
+        out = list[int]()
         entered = self.enters[moves_along(self.graph, path)].tolist()
-        return (*first, *(state for begin in entered for state in self._chain(begin)))
-
-    def _chain(self, state: int) -> list[int]:
-        out = [state]
-        while (following := int(self.after[out[-1]])) != out[-1]:
-            out.append(following)
-        return out
+        for state in (0, *entered) if path else ():
+            out.append(state)
+            while (following := int(self.after[out[-1]])) != out[-1]:
+                out.append(following)
+        return tuple(out[1:])
 
 
 def contracted(graph: Graph) -> Contracted:
@@ -397,8 +386,7 @@ def _first_path(graph: Graph, costs: Floats, after: Floats) -> tuple[int, ...]:
 
 
 PASSES, FAILS = 1, -1
-Ask = Callable[[int, Ints], Ints]
-"""Returns of states (n,) of a part, given by its number, which pass: 1, -1, or 0: not known."""
+Ask = Callable[[int, Ints], Ints]  # of a part by number, states (n,): which pass, 0: not known
 
 
 def _lazy_path(
@@ -411,10 +399,12 @@ def _lazy_path(
 ) -> tuple[int, ...] | None:
     """Return a path of states that pass, the start left out; None if there is none.
 
-    ``parts`` (n,): of every state, from 0; those of one are tested together; ``known`` (n,): 1
-    where a state passes, -1 where it does not, else 0; updated in place; ``ask``: tests states;
-    what stays open counts as failed; ``recall``: cached verdicts; ``tell``: called
-    before every path.
+    Tests are expensive: only states on a path are asked, that on which the fewest are not known
+    (Dellin and Srinivasa, A unifying formalism for shortest path problems with expensive edge
+    evaluations, 2016). A part that turned paths down before is asked first, and more of it each
+    time. ``parts`` (n,): of every state, from 0; ``known`` (n,): 1 where a state passes, -1 where
+    it does not, else 0; updated in place; ``ask``: tests states of a part; what stays open counts
+    as failed; ``recall``: cached verdicts; ``tell``: called before every path.
     """
     failed = Counter[int]()
     while True:

@@ -11,12 +11,13 @@ is, in `tests/formulations/test_free_formulations.py`.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from itertools import accumulate
 from operator import itemgetter
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -32,16 +33,10 @@ Found: TypeAlias = Sequence[tuple[int, Key, Ints]]
 
 
 class Moves(NamedTuple):
-    """Moves from states of one part to states of one part.
+    """Moves from states of one part to states (m, c) of one part.
 
-    Attributes
-    ----------
-    source : (m,) int
-        Row of the state that each leads from, among those that were asked for.
-    states : (m, c) int
-        The states that they lead to.
-    taken : (m, k) float
-        What they take of amounts that are about moves, as `Space.amounts` reads it.
+    ``source`` (m,): row of the state that each leads from, among those that were asked for;
+    ``taken`` (m, k): what they take of amounts that are about moves, as `Space.amounts` reads it.
     """
 
     source: Ints
@@ -49,140 +44,65 @@ class Moves(NamedTuple):
     taken: Floats
 
 
-class Space(Protocol):
+class Space(ABC):
     """States and moves that an explorer visits.
 
-    What a class needs has no body here; the rest says what is so unless a class says otherwise:
-    all moves are there, all values exact, and every state passes.
+    Methods take the key of a part and states (n, c) of it, and return a row for each. What a class
+    needs is abstract; the rest says what is so unless a class says otherwise: all moves are there,
+    all values exact, and every state passes.
     """
 
     @property
+    @abstractmethod
     def first(self) -> int:
         """The level on which builds begin, from 0."""
 
     @property
+    @abstractmethod
     def levels(self) -> int:
         """The last level, on which builds may end."""
 
     @property
+    @abstractmethod
     def peaks(self) -> tuple[bool, ...]:
         """By goal, whether the largest amount on a path counts, not the sum."""
 
+    @abstractmethod
     def start(self) -> tuple[Key, Ints]:
         """Return the first part and its only state (1, c)."""
 
+    @abstractmethod
     def codes(self, part: Key, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its part has.
+        """Return a number (n,) for every state that no other one of its part has."""
 
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        (n,) int
-        """
-
+    @abstractmethod
     def within(self, part: Key, states: Ints) -> Moves:
-        """Return the moves from states that stay within their part.
+        """Return the moves from states that stay within their part."""
 
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        Moves
-        """
-
+    @abstractmethod
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
-        """Yield the moves from states that lead to the next level, by part.
+        """Yield the moves from states that lead to the next level, by the part they lead to."""
 
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Yields
-        ------
-        tuple of (hashable, Moves)
-        """
-
+    @abstractmethod
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        """Return the values of goals in states, and which states are feasible.
+        """Return the values of goals in states (n, g), SI units, and which are feasible (n,).
 
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-        rough : bool
-            Whether single precision is enough.
-        most : float
-            Where there are lower bounds, values of a state in which the first goal is larger may be
-            lower bounds above this.
-
-        Returns
-        -------
-        tuple of ((n, g) float, (n,) bool)
-            Values in SI units.
+        ``rough``: whether single precision is enough; ``most``: where `floors` is true, values of a
+        state in which the first goal is larger may be lower bounds above this.
         """
 
+    @abstractmethod
     def ended(self, part: Key, states: Ints) -> Bools:
-        """Return in which states of the last level a build may end.
-
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return in which states of the last level a build may end, (n,)."""
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return the values of goals of moves.
-
-        Parameters
-        ----------
-        values : (m, g) float
-            Of the states that the moves lead to.
-        taken : (m, k) float
-            As of `Moves`.
-
-        Returns
-        -------
-        (m, g) float
-        """
+        """Return goals of moves (m, g) by ``values`` of the states they lead to, and `Moves`."""
         return values
 
     def to_go(self, part: Key, states: Ints) -> Floats | None:
-        """Return lower bounds of the second goal from states to an end; None if it is no count.
+        """Return lower bounds (n,) of the second goal from states to an end; None if no count.
 
         It is a count if every move takes one of it; no move may lower the bound by more.
-
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        (n,) float or None
         """
         return None
 
@@ -197,36 +117,11 @@ class Space(Protocol):
         return False
 
     def stand(self, part: Key, states: Ints) -> Bools:
-        """Return which states pass the tests that are too expensive for all states.
-
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return which states (n,) pass the tests that are too expensive for all states."""
         return np.ones(len(states), dtype=bool)
 
     def known(self, part: Key, states: Ints) -> Ints:
-        """Return the cached verdicts of `stand`.
-
-        Parameters
-        ----------
-        part : hashable
-            Of which the states are.
-        states : (n, c) int
-            A state a row.
-
-        Returns
-        -------
-        (n,) int
-            1 where a state passes, -1 where it does not, 0 where that is open.
-        """
+        """Return the cached verdicts of `stand`, (n,): 1 passes, -1 does not, 0 is open."""
         return np.zeros(len(states), dtype=np.int64)
 
     @property
@@ -235,25 +130,18 @@ class Space(Protocol):
         return 0, 0
 
     def path(self, found: Found) -> tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]:
-        """Return the order of bricks on a path, and its states.
+        """Return the order of bricks on a path, empty where it is given, and its states.
 
-        Parameters
-        ----------
-        found : sequence of (int, hashable, (c,) int)
-            Level, part and state of all states of the path, the start left out.
-
-        Returns
-        -------
-        tuple of (tuple of int, tuple of tuple of int)
-            The order is empty where it is given; each state is its level, then its numbers.
+        Each is its level, then its numbers.
         """
         return (), tuple((level, *state.tolist()) for level, _, state in found)
 
 
 NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
-
 ARRAYS = ("values", "mark", "exact", "floor", "spent", "to_go")  # of a part, a row for every state
-
+FEW = 8  # states that a dive visits at once at first
+TURNS = 2  # of a dive, over the number of levels
+BAND = 1e-5  # share of a value within which six digits do not decide
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 """Returns values, feasibility, and from which value of the first goal on they are lower bounds."""
 
@@ -307,8 +195,9 @@ class Part:
             self.mark[rows] = np.where(allowed, PENDING, CLOSED)
         return len(rows) > 0
 
+    @property
     def order(self) -> Ints:
-        """Return the rows of visited states, sorted by code."""
+        """The rows of visited states, sorted by code."""
         return np.asarray(self._rows[self.mark[self._rows] == OPEN])
 
 
@@ -333,11 +222,6 @@ class Visited(NamedTuple):
             (*self.states[i][:2], self.states[i][2][n - firsts[i]])
             for i, n in zip(found.tolist(), path, strict=True)
         ]
-
-
-FEW = 8
-TURNS = 2  # of a dive, over the number of levels
-BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 class Explorer:
@@ -387,7 +271,7 @@ class Explorer:
         self._shape = (states.shape[1], states.dtype, len(space.peaks))
         self._each = states[0].nbytes + 8 * len(space.peaks) + 14  # bytes of a state
         self._start = space.first, key
-        part = self._part(*self._start)
+        part = self._parts[space.first][key] = Part(*self._shape)
         part.add(space.codes(key, states), states)
         part.mark[0] = PENDING
         to_go = space.to_go(key, states)
@@ -396,11 +280,6 @@ class Explorer:
         self.threshold, self.below, self.most = -np.inf, np.inf, np.inf
         self.reached = self.level = space.first
         self.passes = self.nbytes = 0
-
-    @property
-    def peaks(self) -> tuple[bool, ...]:
-        """By goal, whether the largest amount on a path counts."""
-        return self.space.peaks
 
     def rise(self, threshold: float = np.inf, below: float = np.inf, most: float = np.inf) -> bool:
         """Visit the states up to a threshold; return whether a build may end in one of them.
@@ -507,9 +386,6 @@ class Explorer:
             return InfeasibleError(why)
         return NothingFoundError(f"{why} among the states that were looked at; look at all")
 
-    def _part(self, level: int, key: Key) -> Part:
-        return self._parts[level].setdefault(key, Part(*self._shape))
-
     def _visit(self, level: int, key: Key, part: Part) -> Ints:
         """Visit states below the threshold and their successors in a part; return their rows."""
         visited = [np.zeros(0, dtype=np.int64)]
@@ -606,7 +482,7 @@ class Explorer:
         if level == self.space.levels or not len(fresh):
             return
         for following, moves in self.space.onward(key, part.states[fresh]):
-            after = self._part(level + 1, following)
+            after = self._parts[level + 1].setdefault(following, Part(*self._shape))
             self._keep((level, key, following), (part, fresh), moves, after)
 
     def _keep(
@@ -657,7 +533,7 @@ class Explorer:
         ``among``: rows of those that are meant, by part; by default all.
         """
         keys = [(level, key) for level, parts in enumerate(self._parts) for key in parts]
-        orders = [self._parts[level][key].order() for level, key in keys]
+        orders = [self._parts[level][key].order for level, key in keys]
         if among is not None:
             pairs = zip(keys, orders, strict=True)
             orders = [own[np.isin(own, among.get(key, ()))] for (_, key), own in pairs]

@@ -65,21 +65,18 @@ COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stab
 class States(Shown):
     """The states of a build and the moves between them; everything is computed when first needed.
 
-    ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
-    allow, or those that choose the open grips of a schedule, however many are open in a step;
-    ``criterion``: what a step costs, for the goals that name no response; ``goals``: what to
-    minimize, the most important first; ``limits``: bounds of all steps; ``standing``: stability
-    requirement of all states, if any; ``settled``: margins that are required as well; ``budgets``:
-    caps on the sums of as many last goals, which are constraints, not objectives; ``scenarios``:
-    engines of the same scene in other states of the world: the largest value over them counts, and
-    limits and stability hold in all; by default that of ``engine`` alone. ``over``: aggregation of
-    their totals, if the goal is a sum; ``weights``: of the scenarios in it, in place of the
-    largest. ``resources``: workers of grip sets, which the proof does
-    not use; ``filters``: further requirements of states; ``orders``: which orders of the bricks are
-    searched, by default the scene's own alone: values keep its scales; ``paths``: resources that
-    plans must keep; ``answers``: responses of grip sets that were computed, by engine and names,
-    shared by all problems that are derived from one; ``judged``: what the judge computed again of
-    all choices of a level, which no formulation is given.
+    ``rules``: which moves are possible: those that rules allow, or those that choose the open grips
+    of a schedule, however many are open in a step; ``criterion``: for the goals that name no
+    response; ``goals``: what to minimize, the most important first; ``standing``: stability
+    requirement of all states; ``settled``: margins that are required as well; ``budgets``: caps on
+    the sums of as many last goals, which are constraints, not objectives; ``scenarios``: engines of
+    the same scene in other states of the world: the largest value over them counts, and limits and
+    stability hold in all; ``over``: aggregation of their totals, if the goal is a sum; ``weights``:
+    of the scenarios in it, in place of the largest; ``resources``: workers of grip sets, which the
+    proof does not use; ``orders``: which orders of the bricks are searched, by default the scene's
+    own alone: values keep its scales; ``paths``: resources that plans must keep; ``answers``:
+    responses of grip sets that were computed, by engine and names, shared by all problems that are
+    derived from one; ``judged``: what the judge computed again, which no formulation is given.
     """
 
     engine: Engine
@@ -101,17 +98,13 @@ class States(Shown):
     judged: dict[object, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
+        parts = [repr(self.network.scene.name)]
+        parts += [repr(self.method)] if self.method != FREE else []
+        parts += [f"{len(self.scenarios)} scenarios"] if self.scenarios else []
+        parts += [f"{self.orders.value} orders"] if self.orders is not None else []
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
-        capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
-        goals = ", ".join([*self.names[: len(self.aims)], *capped])
-        where = f"{self.network.scene.name!r}"
-        if self.rules.method != FREE:
-            where += f", {self.rules.method!r}"
-        if self.scenarios:
-            where += f", {len(self.scenarios)} scenarios"
-        if self.orders is not None:
-            where += f", {self.orders.value} orders"
-        return f"States({where}, {goals}, {len(self.limits)} limits)"
+        parts += [*self.names[: len(self.aims)], *(f"{goal} <= {cap:g}" for goal, cap in caps)]
+        return f"States({', '.join(parts)}, {len(self.limits)} limits)"
 
     @cached_property
     def each(self) -> tuple[States, ...]:
@@ -243,25 +236,18 @@ class States(Shown):
         """Return the node chosen for every move; a `ProblemError` where rules have none."""
         return self.rules.chosen(steps)
 
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of the table of responses: whose grips were open."""
-        return self.rules.step_columns(steps)
-
-    def letting_go(self, steps: Sequence[Step]) -> int:
-        """Return how many steps at the end only let go."""
-        return self.rules.letting_go(self.network.scene, steps)
-
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
         from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
         from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
 
-        network, rules, caps, worlds = self.network, self.rules, self.caps, self.worlds
+        network, rules, caps, parks = self.network, self.rules, self.caps, self.parks
         if isinstance(rules, Schedule):  # its robots are never alike
-            return ScheduleSpace(network, rules, caps, self.parks, worlds)
-        how = {"parks": self.parks, "timed": self.is_timed}
-        return free_space(network, rules, caps, **how, worlds=worlds)
+            return ScheduleSpace(network, rules, caps, parks, self.worlds)
+        return free_space(
+            network, rules, caps, parks=parks, timed=self.is_timed, worlds=self.worlds
+        )
 
     @property
     def worlds(self) -> tuple[Scene, ...]:
@@ -282,12 +268,8 @@ class States(Shown):
     def caps(self) -> Mapping[str, float]:
         """Limits on single robots, by name, N."""
         own = {robot_response(robot.name): robot.name for robot in self.network.scene.robots}
-        out: dict[str, float] = {}
-        for limit in self.limits:
-            if limit.response in own:
-                name = own[limit.response]
-                out[name] = min(limit.bound, out.get(name, np.inf))
-        return out
+        caps = [(own[e.response], e.bound) for e in self.limits if e.response in own]
+        return {name: min(cap for other, cap in caps if other == name) for name, _ in caps}
 
     @cached_property
     def asked(self) -> frozenset[str]:
@@ -303,11 +285,6 @@ class States(Shown):
     def named(self) -> tuple[str, ...]:
         """Those of a state, independent of which robot holds where."""
         return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS) if name in self.asked)
-
-    @cached_property
-    def _of_each(self) -> frozenset[str]:
-        """Those that belong to single robots."""
-        return self.asked - {*self.named}
 
     @property
     def by_robot(self) -> bool:
@@ -370,8 +347,8 @@ class States(Shown):
     ) -> tuple[StateArrays, Bools]:
         """Return states as amounts and filters see them, and which pass the filters.
 
-        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether single precision
-        is enough, except close to a limit. Stability is evaluated later.
+        ``states`` (n, c): as of the space; ``rough``: whether single precision is enough, except
+        close to a limit. Stability is evaluated later.
         """
         seen = self.seen(level, states, rough=rough)
         fits = seen.possible.copy()
@@ -386,7 +363,8 @@ class States(Shown):
 
     def seen(self, level: int, states: Ints, *, rough: bool = False) -> StateArrays:
         """Return states as amounts and filters see them, before any filter is asked."""
-        (held, most), bricks = self._grips(states), self.space.bricks_at(level)
+        held, most = _ascending(self._columns(states), self._caps)
+        bricks = self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
         if rough and self.screened is not self.sets:
             close = self._close(answers, forces, most)
@@ -394,7 +372,7 @@ class States(Shown):
                 answers[close], forces[close] = self.sets.answers(bricks, held[close])
         fits = np.asarray(np.isfinite(np.column_stack([answers, forces])).all(axis=1))
         found, places = self._by_name(answers, forces), states[:, : self.space.robots].clip(min=0)
-        if self._of_each:
+        if self.asked - {*self.named}:  # those of single robots
             found |= self._of_robots(level, states, forces)
         nodes = self._node_numbers[places]
         return StateArrays(bricks, nodes, found, forces, most, fits, self.criterion, states)
@@ -407,8 +385,7 @@ class States(Shown):
         held, own = self._columns(states), np.full(forces.shape, np.nan)
         np.put_along_axis(own, np.argsort(held, axis=1, kind="stable"), forces, axis=1)
         own[held == 0] = np.nan
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        names = [robot_response(self.network.scene.robots[robot].name) for robot in robots]
+        names = [robot_response(self.network.scene.robots[robot].name) for robot in self.robots]
         columns = self.space.open_columns(level)
         moving = own[:, columns[-1]] if columns else np.full(len(states), np.nan)
         return {**dict(zip(names, own.T, strict=True)), "F_move": moving}
@@ -444,9 +421,8 @@ class States(Shown):
         return filters_of(self)
 
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
-        found = dict(zip(self.sets.names, answers.T, strict=True))
-        found[LARGEST] = forces.max(axis=1, initial=0.0)
-        return found
+        named = zip(self.sets.names, answers.T, strict=True)
+        return {**dict(named), LARGEST: forces.max(axis=1, initial=0.0)}
 
     def _close(self, answers: Floats, forces: Floats, most: Floats) -> Bools:
         """Return which states are too close to a limit for single precision, (n,)."""
@@ -568,6 +544,11 @@ class States(Shown):
         """Cached verdicts of the cone program, by brick count and grips."""
         return {}
 
+    @property
+    def robots(self) -> list[int]:
+        """The robot of every column of a state; those that are alike have any of theirs."""
+        return [robot for kind in self.space.kinds for robot in kind.robots]
+
     @cached_property
     def _caps(self) -> Floats:
         """The largest force of the robot of every column of a state, N."""
@@ -578,21 +559,15 @@ class States(Shown):
     def _beyond(self) -> Ints:
         """Offset of the places of grips from those of nodes, of the robot of every column, (r,)."""
         of_robot = self.network.scene.grip_kinds.of_robot
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        return np.asarray(2 * len(self.network.inner) * of_robot[robots])
+        return np.asarray(2 * len(self.network.inner) * of_robot[self.robots])
 
     @cached_property
     def _payloads(self) -> Floats:
         """What the robot of every column may carry where states must stand, N."""
         if not self.rules.keeps_payloads(stands=True):
             return self._caps
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        payloads = np.array([self.network.scene.robots[robot].payload for robot in robots])
+        payloads = np.array([self.network.scene.robots[robot].payload for robot in self.robots])
         return np.asarray(np.minimum(payloads, self._caps))
-
-    def _grips(self, states: Ints) -> tuple[Ints, Floats]:
-        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
-        return _ascending(self._columns(states), self._caps)
 
     def _columns(self, states: Ints) -> Ints:
         """Return the place of the grip of every column, (n, r), 0 for none."""
@@ -634,11 +609,10 @@ def build_states(
 ) -> States:
     """Return the problem of the free schedule of an engine's scene.
 
-    ``rules``: what they allow, or the open grips of a schedule, however many are open in a step;
-    where its states must stand, robots keep their payloads. ``goals``: see `parse_goals`.
-    ``stands``: that every state does, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is
-    computed yet, except scales that a criterion takes from the scene. Raises `ProblemError` if
-    goals, criterion or limits use a response that a state does not have, or ranks among choices.
+    ``goals``: see `parse_goals`; ``stands``: that every state does, robots within payload, with
+    this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is computed yet, except scales that a
+    criterion takes from the scene. Raises `ProblemError` if goals, criterion or limits use a
+    response that a state does not have, or ranks among choices.
 
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
@@ -657,9 +631,8 @@ def build_states(
 def within(problem: States, caps: Mapping[Amount | str, float]) -> States:
     """Return a problem whose plans keep totals over the build within caps.
 
-    ``caps``: amounts or their names, as ``steps``, ``regrips``, ``travel`` (m) or
-    ``sum(RESPONSE)``, and how much each may be. Raises `ProblemError` if something is no total, or
-    a cap is no number from 0.
+    ``caps``: amounts or their names, and how much each may be. Raises `ProblemError` if something
+    is no total, or a cap is no number from 0.
 
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
@@ -687,9 +660,8 @@ def over_scenarios(
 ) -> States:
     """Return a problem whose worst values count in any of some scenarios, or totals over them.
 
-    Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
-    was posed for. A `ProblemError` names a goal that is no worst value, or not the one sum of which
-    totals are made.
+    The criterion keeps the numbers of the scene that it was posed for. A `ProblemError` names a
+    goal that is no worst value, or not the one sum of which totals are made.
     """
     sums = [goal for goal in problem.goals if goal.states and not goal.is_peak]
     if over.aim is Aim.SUM and problem.goals != (*sums,)[:1]:

@@ -295,7 +295,7 @@ class Plan(ShownBuild):
         fields = _each_fields(self.engine, self.steps, Want.ALL)
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        columns.update(self._of_scene.step_columns(self.steps))
+        columns.update(self._of_scene.rules.step_columns(self.steps))
         return columns
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
@@ -344,7 +344,7 @@ class Plan(ShownBuild):
             **self._answer(),
             "budgets": graph.spent(self.objective, self.selection),
             "steps": len(self.steps),
-            "steps_before_release": len(self.steps) - graph.letting_go(self.steps),
+            "steps_before_release": len(self.steps) - graph.rules.letting_go(scene, self.steps),
             "regrips": self.regrips,
             "makespan": self.makespan,
             "idle_robots": list(idle_robots(scene, self.steps)),

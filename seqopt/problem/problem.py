@@ -22,7 +22,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, steps_over
-from seqopt.problem.criteria import Criterion, RankSum, SceneFacts, _counts_every_step
+from seqopt.problem.criteria import Criterion, RankSum, _counts_every_step
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
     Filter,
@@ -36,6 +36,7 @@ from seqopt.problem.requirements import (
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
+from seqopt.responses.scales import SceneFacts
 from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules

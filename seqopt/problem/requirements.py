@@ -17,7 +17,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call
-from seqopt.problem.criteria import Criterion, _response_along
+from seqopt.problem.criteria import Criterion
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
@@ -28,6 +28,7 @@ from seqopt.responses.quantities import (
     length_text,
     robot_response,
 )
+from seqopt.responses.scales import _response_along
 from seqopt.responses.table import _Columns, _steps_in_table
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene

@@ -17,18 +17,17 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.problem import Amount, Filter
 from seqopt.problem.amounts import BUILT_IN, find_amount
 from seqopt.problem.criteria import (
-    NEVER,
     OVER_METHODS,
     ROUNDED,
     WORST_OVER_METHODS,
     RankSum,
-    Units,
     WeightedSum,
     _mean_ranks,
     equal,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.problem import parse_budgets
+from seqopt.responses.scales import NEVER, Units
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch

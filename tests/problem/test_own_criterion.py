@@ -16,17 +16,9 @@ from experiments.harness.scenes import running_bond
 from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
-from seqopt.problem.criteria import (
-    NEVER,
-    OVER_METHODS,
-    RankSum,
-    SceneFacts,
-    StepCost,
-    WeightedSum,
-    crown,
-    equal,
-)
+from seqopt.problem.criteria import OVER_METHODS, RankSum, StepCost, WeightedSum, equal
 from seqopt.problem.problem import Aim
+from seqopt.responses.scales import NEVER, SceneFacts, crown
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION

@@ -18,10 +18,10 @@ from seqopt.engines.registry import engine_mortar
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
-from seqopt.problem.criteria import OWN
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import overloads
 from seqopt.responses._tolerance import values_text
+from seqopt.responses.scales import OWN
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability._builds import BuildProver, BuildVerdicts, find_prover
