@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
@@ -51,7 +51,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
-from seqopt.stability.standing import Standing, StandingSets
+from seqopt.stability.standing import Standing, StandingSets, as_standing
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
@@ -624,8 +624,7 @@ def build_states(
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)
-    standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(States(engine, rules, criterion, named, limits, standing))
+    return _asked(States(engine, rules, criterion, named, limits, as_standing(stands)))
 
 
 def within(problem: States, caps: Mapping[Amount | str, float]) -> States:

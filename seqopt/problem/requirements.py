@@ -1,4 +1,26 @@
-"""The requirements on a plan: a criterion, limits, what these need, and which steps exceed them."""
+r"""The requirements on a plan: limits, filters of states, resources of paths; what exceeds them.
+
+A filter answers twice, since what it asks may stay open. A plan passes states :math:`s` that are
+*proven to pass*; a proof leaves out those that are *proven not to*:
+
+.. math:: P = \{s : f(s) \text{ is proven}\}, \qquad R = \{s : \neg f(s) \text{ is proven}\}, \qquad
+   P \cap R = \emptyset .
+
+Limits, payloads, rules, standing and arms are filters of one kind. Each knows how it can be
+loosened, from which remedies of an infeasible problem are found.
+
+A resource is what depends on the whole path so far. A *label* of a state is what a path to it has
+come to, a vector :math:`z` that begins as :math:`z_0`, and a step from :math:`s` to :math:`s'`
+extends it,
+
+.. math:: z' = f(s, s', z), \qquad z' = \infty \; \text{ where the step may not follow this path.}
+
+Of two labels of one state the first *dominates* the other one if every extension of that one is
+feasible for it: by default where none of its values is larger, so :math:`f` must not fall in
+:math:`z`. When robots are free, how old mortar is and sums within budgets are carried by labels in
+the same way (`seqopt.graph._labels`). Further filters and resources are registered
+(`seqopt.register`) and named as limits.
+"""
 
 from __future__ import annotations
 
@@ -136,10 +158,7 @@ def _step_limits(given: Sequence[Limit] | Limit, scene: Scene) -> tuple[Limit, .
 
 def _said_limits(limits: Sequence[Limit]) -> dict[str, object]:
     """Return bounds by the names of limits, in display units, ready for JSON."""
-    return {
-        limit.label: limit.shown(limit.bound) if math.isfinite(limit.bound) else LIFTED
-        for limit in limits
-    }
+    return {e.label: e.shown(e.bound) if math.isfinite(e.bound) else LIFTED for e in limits}
 
 
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
@@ -239,9 +258,9 @@ def _carrying_excesses(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Excess, 
     """Return who carries bricks that are heavier than its payload, in the order of the robots."""
     out, every = [], [*carried(scene, steps)]
     for r, (robot, limit) in enumerate(zip(scene.robots, payload_limits(scene), strict=True)):
-        own, load = [each for each in every if each.robot == r], loads(scene, robot)
-        weighed = [(float(load[scene.since[each.brick] - 1]), each) for each in own]
-        over = [(load, each) for load, each in weighed if limit.exceeded(np.array(load))]
+        load = loads(scene, robot)
+        own = ((float(load[scene.since[e.brick] - 1]), e) for e in every if e.robot == r)
+        over = [(load, each) for load, each in own if limit.exceeded(np.array(load))]
         if over:
             numbers = tuple(sorted(each.step for _, each in over))
             most, worst = max(over)

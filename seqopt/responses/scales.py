@@ -89,9 +89,10 @@ class SceneFacts:
 
     @property
     def own_scales(self) -> Mapping[str, float]:
-        """Scales of any scene, SI units: of grip forces the smallest payload, of tension its weight.
+        """Scales that every scene has, SI units: of grip forces the smallest payload.
 
-        Of ``M_sup`` this at its size, of ``D_max`` what it moves a chain of all joints.
+        Of ``T_max`` it is the weight, of ``M_sup`` this at the scene's size, of ``D_max`` what it
+        moves a chain of a joint for every brick.
         """
         scene = self.engine.network.scene
         size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()

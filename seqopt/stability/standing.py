@@ -99,6 +99,11 @@ class Standing:
         }
 
 
+def as_standing(given: Standing | Mortar | str | None) -> Standing | None:
+    """Return a requirement that is given as such, or by its mortar."""
+    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
+
+
 def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
     out = dict.fromkeys(demands)
     return tuple(one for one in out if not any(o._implies(one) for o in out if o != one))
