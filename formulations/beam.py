@@ -33,25 +33,22 @@ from functools import partial
 
 import numpy as np
 
-from formulations.cascade import _charged
-from formulations.choice import Choice, greedy, onward, shortest
-from formulations.on_graph import on_graph
-from formulations.states._search import (
+from formulations._search import (
     StopError,
     Watching,
     after_margins,
     best_standing,
-    best_total,
     narrow,
     plan_by_then,
 )
+from formulations.cascade import _charged
+from formulations.on_graph import Choice, best_total, greedy, on_graph, onward, shortest
 from seqopt.errors import ProblemError
-from seqopt.graph._explore import Explorer
+from seqopt.graph._spaces import build_space
 from seqopt.graph.formulation import FormulationKind, Solution, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import moves_out, path_values
-from seqopt.graph.states.explored import build_space
-from seqopt.graph.states.states import States
+from seqopt.graph.graph import Graph, moves_out, path_values
+from seqopt.graph.space import Explorer
+from seqopt.graph.states import States
 from seqopt.problem.problem import Aim
 
 

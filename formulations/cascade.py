@@ -25,8 +25,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.choice import Choice, greedy, onward
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, greedy, on_graph, onward
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch

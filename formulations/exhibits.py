@@ -45,14 +45,12 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.choice import Choice
 from formulations.flow import ACCURACY, WholeProgram, by_integers, conserved, unit_flow
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances
+from seqopt.graph.graph import Graph, distances
 from seqopt.problem.problem import Aim
 
 

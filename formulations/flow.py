@@ -50,14 +50,12 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.choice import Choice, Choose, at_hand
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, Choose, at_hand, on_graph
 from formulations.solvers import EXACTLY, minimize_by_highs
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, fewest_moves, lexicographic, path_values, tied
+from seqopt.graph.graph import TIED, Graph, fewest_moves, lexicographic, path_values, tied
 from seqopt.problem.problem import Aim
 
 ACCURACY = 1e-8  # how far a reported optimum may lie above the true one, relative to the larger of

@@ -32,13 +32,11 @@ costs and takes; those are continued that may become better than the best path k
 
 from __future__ import annotations
 
-from formulations.choice import Choice, shortest
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph, shortest
 from seqopt.errors import ProblemError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph.formulation import FormulationKind, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import strictly_below
+from seqopt.graph.graph import Graph, strictly_below
 from seqopt.problem.problem import Aim
 
 

@@ -1,7 +1,7 @@
 """What formulations of paths share: a graph goes in, a path and its lower bounds come out.
 
-A formulation is a function from a `seqopt.graph.graph.Graph` to a `formulations.choice.Choice`: a
-path and its lower bounds. The graph is that of the open grips of a schedule, of the states of a
+A formulation is a function from a `seqopt.graph.graph.Graph` to a `Choice`: a path and its lower
+bounds. The graph is that of the open grips of a schedule, of the states of a
 free schedule, of all orders, or of an instance; see `on_graph`. One of your own needs this import
 alone:
 
@@ -14,29 +14,269 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from formulations.choice import Choice, Choose, onward
-from formulations.states._search import (
+from formulations._search import (
+    WIDTH,
+    StopError,
+    Watching,
+    _too_little,
     after_margins,
-    best_total,
-    cheapest_by,
-    chosen,
-    least_total,
+    narrow,
+    plan_by_then,
+    selected,
     watched,
 )
-from seqopt.arrays import Terse
+from seqopt.arrays import Floats, Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
+from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
+from seqopt.graph._spaces import build_space, explore
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import (
+    Best,
+    Contracted,
+    Graph,
+    _on_paths,
+    contracted,
+    distances,
+    lexicographic,
+    moves_along,
+    path_values,
+    tied,
+)
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
-from seqopt.graph.paths import path_values, tied
-from seqopt.graph.states.states import States
-from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
-from seqopt.work.progress import Tell
+from seqopt.graph.space import Explorer, Visited
+from seqopt.graph.states import States
+from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.work.progress import Tell, answered
+
+_Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
+STEPS = 400  # weights that are tried at most
+CLOSE = 1e-9  # differences that are none, over the size of the values
+LABELS = 16_384  # of a level that are continued at most
+
+
+class Choice(NamedTuple):
+    """A path through a graph, its start left out and empty where none was found in time.
+
+    ``bounds``: lexicographic lower bounds of the first goals, those before each being at their
+    values; ``stopped``: whether time was over before all was found; ``prices``: by goal, the
+    multipliers of caps and of the sums before it that prove its bound; ``compile_seconds``: what
+    writing a program down took.
+    """
+
+    path: tuple[int, ...]
+    bounds: tuple[float, ...] = ()
+    stopped: bool = False
+    prices: tuple[tuple[float, ...], ...] = ()
+    compile_seconds: float = 0.0
+
+
+Choose = Callable[..., Choice]
+"""Takes a graph whose moves are all on paths from the start to an end, a `Watch` and options."""
+
+
+def onward(graph: Graph) -> Graph:
+    """Return the graph of moves after which fewer moves are left to an end."""
+    left = distances(graph, np.ones(len(graph.source)), back=True)
+    return graph.only(left[graph.target] < left[graph.source])
+
+
+def greedy(graph: Graph, charged: Floats) -> tuple[int, ...]:
+    """Return the path that always takes the move which is charged least, (m,), the first of ties.
+
+    ``graph``: every move leads on to an end.
+    """
+    state, path = 0, list[int]()
+    while not graph.ends[state]:
+        moves = graph.moves_from(state)
+        state = int(graph.target[moves][np.argmin(charged[moves])])
+        path.append(state)
+    return tuple(path)
+
+
+def at_hand(graph: Graph, *ways: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the first path within the caps: of some, what is cheapest now, what is least capped.
+
+    Empty if none of these is within all caps.
+    """
+    ahead, every = onward(graph), np.ones(graph.states, dtype=bool)
+    ways += (greedy(ahead, ahead.amounts[:, 0]),)
+    ways += tuple(
+        lexicographic(graph.bare(c, every)).path for c in range(graph.goals, len(graph.peaks))
+    )
+    for path in ways:
+        taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
+        if (taken <= np.array([tied(cap) for cap in graph.caps])).all():
+            return path
+    return ()
+
+
+def shortest(graph: Graph, watch: Watch) -> Choice:
+    """Return the path that is best goal after goal; one that is at hand where time is over."""
+    if watch.over:
+        return Choice(at_hand(graph), stopped=True)
+    return Choice(*lexicographic(graph))
+
+
+def best_total(
+    problem: States, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
+) -> Solution:
+    """Return the plan of least total over scenarios, with its bound and scenario weights.
+
+    ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
+    default all, without which no plan is proven to be the least.
+    """
+    demands = bool(problem.demands)
+    space = build_space(problem, regrips=width is None, standing=demands)
+    try:
+        found = Explorer(space, width, tell)
+        if not found.rise():
+            if width is not None:
+                return best_total(problem, choose, watch, tell)
+            raise found.without_plan("no plan is allowed")
+        visited = found.graph()
+        short = _decisions(problem, visited.graph)
+        best = least_total(short.graph, problem.over, cheapest_by(choose, watch), watch)
+    except StopError as stop:
+        raise _too_little(stop) from None
+    plan = selected(space, visited, Best(short.expanded(best.path), (best.value,)))
+    prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
+    return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
+
+
+def chosen(
+    problem: States, choose: Choose, watch: Watch, tell: Watching, *, alone: bool = False
+) -> Solution:
+    """Return the plan of a choice; where time was over, the better one of it and the incumbent.
+
+    ``alone``: whether it is charged as of `Graph.alone`, where grips are open.
+    """
+    first = None
+    try:
+        first = narrow(problem, WIDTH, tell)
+        wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
+        if not wide.whole:
+            raise wide.without_plan("no plan is allowed")
+        wide.refine()
+        graph, states = wide.graph()
+        graph = replace(graph, caps=problem.budgets)
+        if alone and problem.rules.names_robots() and problem.goals[0].of_criterion:
+            own = [problem.candidates.charges(level, rows) for level, _, rows in states]
+            graph = replace(graph, alone=np.concatenate(own)[graph.target])
+        short = _decisions(problem, graph)
+        with answered(watch.interrupt):
+            best = choose(short.graph, watch)
+    except (StopError, KeyboardInterrupt) as stop:
+        return plan_by_then(first, stop)
+    stopped = "interrupt" if watch.interrupted else "time" * best.stopped
+    if best.path:
+        path = short.expanded(best.path)
+        values = path_values(graph, path)
+        found = selected(wide.space, Visited(graph, states), Best(path, values))
+    if not best.path or (first and best.stopped and first.objective < values):
+        found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
+    known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
+    bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
+    return replace(
+        found,
+        bound=bound,
+        stopped=stopped,
+        prices=best.prices,
+        compile_seconds=best.compile_seconds,
+    )
+
+
+def _decisions(problem: States, graph: Graph) -> Contracted:
+    """Return the moves on paths to ends; where grips are open each with the forced ones behind."""
+    kept, every = graph.only(_on_paths(graph)), np.arange(graph.states)
+    if problem.rules.moves:
+        return contracted(kept)
+    return Contracted(kept, every, kept.target.astype(np.int64), every)
+
+
+def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
+    """Return an oracle of the shortest path and its lower bound."""
+
+    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
+        found = choose(graph, watch)
+        if not found.path:
+            raise StopError("time")
+        return found.path, found.bounds[0] if found.bounds else -np.inf
+
+    return cheapest
+
+
+class LeastTotal(NamedTuple):
+    """Incumbent, its value, lower bound and the weights (S,) that prove most of it."""
+
+    path: tuple[int, ...]
+    value: float
+    bound: float
+    weights: Floats
+
+
+def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
+    """Return the path of least total.
+
+    ``graph``: with a sum for every scenario, all of it on paths from the start to ends;
+    ``cheapest``: an oracle of the shortest path through a graph with one goal, and its bound.
+    """
+    best = by_weights(graph, aim, cheapest, watch)
+    if watch.over or best.bound >= best.value - CLOSE * abs(best.value):
+        return best._replace(bound=min(best.bound, best.value))
+    growth = Joint(graph, [_Totals(graph, aim, best.weights)])
+    known = LabelSearch(None, best.value, best.bound)  # labels close the gap that weights leave
+    found = widening(growth, np.zeros(0), known, watch, LABELS)
+    path = best.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
+    return LeastTotal(path, found.cost, found.bound, best.weights)
+
+
+def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
+    """Return the best path met on the way to the weights of the highest lower bound."""
+    count, best = len(graph.peaks), LeastTotal((), np.inf, -np.inf, np.zeros(0))
+
+    def met(weights: Floats) -> Plane:
+        nonlocal best
+        sums = (graph.amounts @ weights)[:, None]
+        path, bound = cheapest(Graph(graph.source, graph.target, sums, (False,), graph.ends))
+        totals = graph.amounts[moves_along(graph, path)].sum(axis=0)
+        if aim.value(totals) < best.value:
+            best = best._replace(path=path, value=aim.value(totals))
+        return Plane(0.0, totals, bound)
+
+    def ended(bound: float) -> bool:
+        watch.tell(best.value, bound)
+        return watch.over
+
+    region = Polyhedron(aim.most(count), counts=np.ones(count))
+    start = np.full(count, 1.0 / count)
+    weights, bound = highest_bound(met, start, region, ended, rounds=STEPS, closed=CLOSE)
+    return best._replace(bound=bound, weights=weights)
+
+
+class _Totals(Sums):
+    """The totals of all scenarios, bounded by weights (S,), and by single scenarios."""
+
+    def __init__(self, graph: Graph, aim: RobustAim, weights: Floats) -> None:
+        scenarios, self._aim = len(weights), aim
+        single = np.eye(scenarios if aim.most(scenarios) >= 1 else 0, scenarios)
+        self._weights = np.vstack([weights, single])
+        left = [distances(graph, graph.amounts @ own, back=True) for own in self._weights]
+        super().__init__(graph.amounts, np.array([np.inf]), np.column_stack(left))
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        """Return a lower bound of the aim by totals of paths, (N, 1)."""
+        weighed = values @ self._weights.T + self._left[state]
+        return np.asarray(weighed.max(axis=1, keepdims=True))
+
+    def totals(self, values: Floats) -> Floats:
+        """Return the aim of totals, (N, 1)."""
+        return self._aim.each(values)[:, None]
 
 
 def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:

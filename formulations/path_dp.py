@@ -28,8 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.choice import Choice, shortest
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph, shortest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph

@@ -14,7 +14,7 @@ Continued first is the label whose vector :math:`f` is least, goal by goal,
    f_g = \max \{ z_g, h_g(v) \} \quad\text{or}\quad f_g = z_g + h_g(v),
 
 and one that another one of the same state dominates is dropped. The first one at an
-end is the best, since no goal ever gets less on the way. Values up to `seqopt.graph.paths.TIED`
+end is the best, since no goal ever gets less on the way. Values up to `seqopt.graph.graph.TIED`
 apart count as one. In ``path_labels`` the lower bound of the rest of a path is :math:`h = 0`
 (Martins, On a multicriteria shortest path problem, 1984). In ``best_first`` (A*) it is the optimum
 of every goal alone: 0 at an end, and
@@ -36,12 +36,10 @@ from operator import le
 
 import numpy as np
 
-from formulations.choice import Choice
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import tied
+from seqopt.graph.graph import Graph, tied
 
 _Values = tuple[float, ...]
 

@@ -23,13 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.choice import Choice, onward
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph, onward
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import moves_out
+from seqopt.graph.graph import Graph, moves_out
 from seqopt.problem.problem import Aim
 
 MOST = 20_000_000  # combinations in one enumeration

@@ -9,7 +9,7 @@ r"""Totals over scenarios as one mixed-integer program (cvxpy, HiGHS): a referen
 with the costs :math:`c_s` of moves in every scenario and the largest weight :math:`\bar w` of one:
 1 for the worst total, :math:`1 / ((1 - \alpha) S)` for the mean total of the worst
 :math:`1 - \alpha` of :math:`S` scenarios (Rockafellar and Uryasev). Without the integers its value
-is that which weights of scenarios prove (`formulations.states._search`), tens to hundreds of times
+is that which weights of scenarios prove (`formulations.on_graph`), tens to hundreds of times
 faster by dynamic programs.
 """
 
@@ -18,8 +18,8 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
-from formulations.choice import Choice
 from formulations.flow import conserved, unit_flow
+from formulations.on_graph import Choice
 from formulations.solvers import minimize_by_highs
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph

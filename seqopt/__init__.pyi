@@ -17,9 +17,9 @@ from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.pose import pose as pose
 from seqopt.plan.solve import solve as solve
-from seqopt.problem.filters import register as register
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
+from seqopt.problem.requirements import register as register
 from seqopt.questions import analyze as analyze
 from seqopt.questions import assess as assess
 from seqopt.questions import pareto as pareto

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from enum import Enum
 from itertools import accumulate
@@ -164,3 +164,50 @@ def _short(content: object) -> str:
         many = f"<{len(content)} {type(content[0]).__name__}>" if len(content) > 3 else ""
         return many or "(" + ", ".join(map(_short, content)) + ")"
     return repr(content)
+
+
+class KnownRows:
+    """Cached rows of values by a key and a code.
+
+    ``count``: the number computed; ``nbytes``: what they and their codes take, bytes.
+
+    >>> rows = KnownRows()
+    >>> codes = np.array([3, 1, 3])
+    >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
+    array([9., 1., 9.])
+    >>> rows.count, rows.nbytes
+    (2, 32)
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[object, tuple[Ints, Floats]] = {}
+        self.count = self.nbytes = 0
+
+    def known(self, key: object, codes: Ints) -> Floats:
+        """Return the first values (n,) of cached rows; NaN of others."""
+        known, values = self._known.get(key, (codes[:0], None))
+        if values is None or not len(known):
+            return np.full(len(codes), np.nan)
+        at = np.searchsorted(known, codes).clip(max=len(known) - 1)
+        return np.where(known[at] == codes, values[at, 0], np.nan)
+
+    def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
+        """Return the rows of codes; those not cached are computed as one batch.
+
+        ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
+        k) of distinct codes, given the places (m,) of their first occurrence in the request.
+        Result (n, k).
+        """
+        distinct, first = np.unique(codes, return_index=True)
+        known, values = self._known.get(key, (distinct[:0], None))
+        fresh = first[~np.isin(distinct, known, assume_unique=True)]
+        if values is None or len(fresh):
+            computed = compute(fresh)
+            known = np.concatenate([known, codes[fresh]])
+            values = computed if values is None else np.concatenate([values, computed])
+            order = np.argsort(known, kind="stable")
+            known, values = known[order], values[order]
+            self._known[key] = known, values
+            self.count += len(fresh)
+            self.nbytes += codes[fresh].nbytes + computed.nbytes
+        return np.asarray(values[np.searchsorted(known, codes)])

@@ -29,9 +29,8 @@ from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of
-from seqopt.problem.filters import Filter
-from seqopt.problem.requirements import Criterion, Limit
-from seqopt.problem.standing import Standing
+from seqopt.problem.criteria import Criterion
+from seqopt.problem.requirements import Filter, Limit
 from seqopt.responses import table
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, find_postures
@@ -43,6 +42,7 @@ from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Site, Step
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
+from seqopt.stability.standing import Standing
 from seqopt.study import CRITERIA, PUBLISHED, is_reference_arch, published_plan
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import Search, optimize, parse_numbers, pose_build

@@ -21,11 +21,16 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import default_formulation, pose
 from seqopt.plan.solve import _solve_run
-from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.filters import Filter, parse_limits
+from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
-from seqopt.problem.requirements import LARGEST, Criterion, Limit, number_word, split_word
-from seqopt.problem.standing import Standing
+from seqopt.problem.requirements import (
+    LARGEST,
+    Filter,
+    Limit,
+    number_word,
+    parse_limits,
+    split_word,
+)
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
@@ -34,6 +39,7 @@ from seqopt.sequence.part import Part, _Place, find_scene, find_schedule
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Site, StepKind
+from seqopt.stability.standing import Standing
 from seqopt.study import EQUATIONS, find_criterion
 from seqopt.work.progress import Clock, Tell
 

@@ -47,12 +47,11 @@ SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
     "formulations.solvers",
-    "formulations.choice",
     "formulations.on_graph",
     "formulations.cascade",
     "formulations.labels",
     "formulations.flow",
-    "formulations.states._search",
+    "formulations._search",
     "formulations.times._search",
     "formulations.times._labels",
     "formulations.times._stages",

@@ -40,7 +40,7 @@ LATE = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.repo
 SELDOM = (
     *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
-    *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
+    *("seqopt.engines.rigid._refinement", "seqopt.graph._spaces"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
     "seqopt.sequence._space",
 )

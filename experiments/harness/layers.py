@@ -15,14 +15,15 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.graph import Graph, Rows, lexicographic
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
-from seqopt.graph.paths import lexicographic
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
 from seqopt.plan.pose import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim
 from seqopt.sequence.schedule import Schedule
+
+JOIN = {Aim.SUM: np.add, Aim.PEAK: np.maximum}  # how costs go together
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,7 +63,7 @@ class LayeredCosts(FrozenValue):
     def arcs(self, aim: Aim = Aim.SUM) -> list[Floats]:
         """Return the cost of a pair and its later choice, (C_{k-1}, C_k) for every move."""
         pairs = zip(self.shared, self.single, strict=True)
-        return [aim.join(shared, single) for shared, single in pairs]
+        return [JOIN[aim](shared, single) for shared, single in pairs]
 
     def parts(self, choice: Sequence[int]) -> list[float]:
         """Return the costs of a choice by move: its own, and that shared with the move before."""
@@ -82,7 +83,7 @@ class LayeredCosts(FrozenValue):
 
     def least(self, aim: Aim) -> float:
         """Return the least total, or largest cost, of any choice; infinite if there is none."""
-        reached, join = np.zeros(1), aim.join
+        reached, join = np.zeros(1), JOIN[aim]
         for k, arcs in enumerate(self.arcs(aim)):
             reached = (join(reached[:, None], arcs) if k else arcs).min(axis=0)
         return float(reached.min())

@@ -9,7 +9,7 @@ import pandas as pd
 
 from experiments.harness.layers import LayeredCosts, Layers
 from seqopt.arrays import Floats
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.problem.problem import Problem
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal

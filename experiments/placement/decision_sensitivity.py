@@ -39,9 +39,11 @@ from experiments.harness.results import drawn
 from seqopt import Scene, Schedule, build_network, load_scene, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.plan.pose import graph_of, pose
+from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import Criterion, Limit, SceneFacts
+from seqopt.problem.requirements import Limit
 from seqopt.report._style import dress, looks, styled
+from seqopt.responses.scales import SceneFacts
 from seqopt.scene.scenarios import _stiffened, shifted, weighed
 from seqopt.study import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 

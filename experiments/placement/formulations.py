@@ -43,7 +43,7 @@ from experiments.harness.scenes import scene_named
 from seqopt import CRITERIA, FreeRules, Search, build_network, make_engine, optimize
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import exhibits, formulations
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.report._style import SMALL, plain, styled
 
 

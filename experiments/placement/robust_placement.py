@@ -43,10 +43,10 @@ from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
-from seqopt.graph.states.states import States, over_scenarios
+from seqopt.graph.states import States, over_scenarios
 from seqopt.plan.pose import graph_of, pose
+from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, Problem, RobustAim, cvar
-from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study import EQUATIONS, WEIGHTED, WORST_RATIO

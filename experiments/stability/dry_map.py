@@ -24,12 +24,12 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt import FreeRules, Scene, make_engine
 from seqopt.contact.mortar import Mortar
-from seqopt.graph.states.explored import explore
-from seqopt.graph.states.states import build_states
-from seqopt.problem.standing import Standing
+from seqopt.graph._spaces import explore
+from seqopt.graph.states import build_states
 from seqopt.report._style import SMALL, styled
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot
+from seqopt.stability.standing import Standing
 from seqopt.study import CRITERIA
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m

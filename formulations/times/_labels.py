@@ -19,9 +19,9 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
 from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
-from seqopt.graph.paths import distances, fewest_moves, moves_along
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.graph.graph import Graph, distances, fewest_moves, moves_along
+from seqopt.graph.instance import HELD, NOW, TimedGraph
+from seqopt.problem.requirements import Resource, StepArrays
 
 ROUNDS = 25  # of cutting planes
 CLOSED = 1e-7  # relative tolerance of the multipliers
@@ -223,7 +223,7 @@ class Carrying:
         if self.steps is not None:
             own += [Asked(each, self.steps.only(moves)) for each in self.asked]
         arcs = graph.source[moves].astype(np.int64), graph.target[moves].astype(np.int64)
-        return Joint(graph, self.levels, arcs, own)
+        return Joint(graph, own, self.levels, arcs, look_back=len(moves))
 
     def sweep(
         self,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.states._search import (
+from formulations._search import (
     WIDTH,
     StopError,
     Watching,
@@ -26,13 +26,12 @@ from formulations.states._search import (
 from formulations.times._labels import Carrying
 from formulations.times._stages import ALMOST, Goals, Least, StageFound, Stages, by_labels
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
-from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._spaces import build_space, seen_steps
 from seqopt.graph.formulation import Solution, Watch
+from seqopt.graph.graph import tied
 from seqopt.graph.instance import PEAK, TIME, Instance
-from seqopt.graph.paths import tied
-from seqopt.graph.states._visits import seen_steps
-from seqopt.graph.states.explored import build_space
-from seqopt.graph.states.states import States
+from seqopt.graph.space import Explorer, Visited
+from seqopt.graph.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._fall_cuts import FallCuts

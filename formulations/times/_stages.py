@@ -12,15 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.states._search import StopError
+from formulations._search import StopError
 from formulations.times._labels import Caps, Carrying, Prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
-from seqopt.graph._explore import Visited
 from seqopt.graph._labels import Labels, LateError, Swept
-from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import LabelProof
-from seqopt.graph.paths import _best_moves, _on_paths, moves_along, tied
+from seqopt.graph.formulation import LabelProof, Watch
+from seqopt.graph.graph import _best_moves, _on_paths, moves_along, tied
+from seqopt.graph.space import Visited
 from seqopt.problem.amounts import Amount
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set

@@ -17,12 +17,12 @@ from seqopt.contact.mortar import _find_curing, find_mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import formulation_names
-from seqopt.problem.standing import Standing
 from seqopt.scene.scenarios import MOST
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.part import Part, find_scene
 from seqopt.stability.assessment import MARGINS
+from seqopt.stability.standing import Standing
 from seqopt.study import CRITERIA, PUBLISHED
 from seqopt.workflow import Robust, Search
 

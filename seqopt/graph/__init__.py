@@ -2,8 +2,7 @@
 
 A *space* says which states there are, which moves lead from one to the next, and what they take. An
 `Explorer` visits the states below a threshold and gives them as a `Graph`, which is arrays alone:
-`seqopt.graph.paths` finds best paths through it, and `seqopt.graph.paths` proves from the same
-arrays that no path is better.
+`seqopt.graph.graph` finds best paths through these, and proves that no path is better.
 
 >>> import numpy as np
 >>> from seqopt.graph import Graph, lexicographic
@@ -20,18 +19,10 @@ from typing import TYPE_CHECKING
 from seqopt._registry import later
 
 if TYPE_CHECKING:
-    from seqopt.graph._explore import Explorer, Visited
-    from seqopt.graph.graph import Graph
-    from seqopt.graph.paths import Best, lexicographic
+    from seqopt.graph.graph import Best, Graph, lexicographic
+    from seqopt.graph.space import Explorer, Visited
 
 __all__ = ["Best", "Explorer", "Graph", "Visited", "lexicographic"]
 __getattr__, __dir__ = later(
-    __name__,
-    {
-        "Best": "paths",
-        "Explorer": "_explore",
-        "Graph": "graph",
-        "Visited": "_explore",
-        "lexicographic": "paths",
-    },
+    __name__, {name: "space" if name in ("Explorer", "Visited") else "graph" for name in __all__}
 )

@@ -49,10 +49,9 @@ from scipy.sparse.csgraph import dijkstra
 from seqopt._registry import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
-from seqopt.graph._labels import CappedSums, LabelSearch, widening
+from seqopt.graph._labels import CappedSums, Joint, LabelSearch, widening
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import ROUNDING, least_sum, tied
+from seqopt.graph.graph import ROUNDING, Graph, least_sum, tied
 
 optimize = Later("scipy.optimize")  # slow to import
 
@@ -112,10 +111,10 @@ def within_budgets(
             if most:  # labels close the duality gap
                 columns, costs = [c for c, _ in limited], graph.amounts[:, goal]
                 within = np.array([tied(cap) for _, cap in limited])
-                growth = CappedSums(graph, costs, graph.amounts[:, columns], within, price)
+                sums = CappedSums(graph, costs, graph.amounts[:, columns], within, price)
                 known = np.inf if moves is None else float(costs[moves].sum())
                 met = LabelSearch(moves, known, bound)
-                met = widening(growth, within, met, told or watch.apart(), most)
+                met = widening(Joint(graph, [sums]), within, met, told or watch.apart(), most)
                 bound, moves = met.bound, met.arcs
             way = _path(graph, moves)
         best = _better(graph, goal, way, best)
@@ -143,9 +142,9 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
         return path
     if found.bound <= _rounding(graph, found.prices, caps):
         most = np.array([tied(cap) for cap in caps])
-        growth = CappedSums(graph, nothing, graph.amounts[:, goals:], most, found.prices)
+        sums = CappedSums(graph, nothing, graph.amounts[:, goals:], most, found.prices)
         until = watch.apart()  # costs of zero are no incumbent's
-        met = widening(growth, most, NONE, until, LABELS, any_path=True)
+        met = widening(Joint(graph, [sums]), most, NONE, until, LABELS, any_path=True)
         path = _path(graph, met.arcs)
         if path is None and until.over:
             raise TimeUpError("no path within all caps was found yet; give more")

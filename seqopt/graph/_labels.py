@@ -21,8 +21,7 @@ incumbent. The beam is widened until no pruned label could lead to a better path
 many labels, or time is over, the least bound of the pruned ones bounds all paths.
 
 Every value belongs to a resource (`Carried`): sums, when robots are free and how old mortar is
-(`formulations.times`), and what problems ask for (`seqopt.problem.resources`). One search serves
-all.
+(`formulations.times`), and what problems ask for (`Resource`). One search serves all.
 """
 
 from __future__ import annotations
@@ -30,15 +29,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, strictly_below
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.graph.graph import Graph, distances, strictly_below
+from seqopt.problem.requirements import Resource, StepArrays
 
 NARROW, WIDER = 256, 16  # labels of a level kept at first, and how many times as many then
 CHUNK = 2_000_000  # arcs of labels that are looked at together
@@ -74,27 +72,127 @@ def _joined(parts: Sequence[Labels]) -> Labels:
     return Labels(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-class _Growth(Protocol):
-    """Extension of labels by arcs, dominance, and lower bounds of their completions."""
+class Carried:
+    """A resource on the arcs of a graph; here one that limits nothing beyond its extension.
 
-    ends: Bools  # (n,)
-    levels: Ints  # (n,): no arc leads to a lower one
-    starts: Ints  # (n + 1,): the first arc from every state
-    target: Ints  # (a,)
-    first: Floats  # (1, k): values of the start
-    look_back: int  # with how many labels of its state one is compared
+    ``first`` (k,): values at the start; ``limits`` (b,): upper limits of its limited values.
+    """
+
+    first: Floats
+    limits: Floats = np.zeros(0)
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        """Return values (N, k) after arcs (N,); infinite where they may not be taken."""
+        raise NotImplementedError
+
+    def totals(self, values: Floats) -> Floats:
+        """Return the limited values (N, b) of paths that end with labels."""
+        return values[:, :0]
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        """Return lower bounds (N, b), over all completions of labels, of the limited values."""
+        return self.totals(values)
+
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where the first values (N, k) dominate the others."""
+        return np.asarray((first <= other).all(axis=1))
+
+    def ends(self, values: Floats) -> Bools:
+        """Return with which values a path may end, (N,)."""
+        return np.ones(len(values), dtype=bool)
+
+
+class Asked(Carried):
+    """A resource of a problem on the arcs of a graph, ``steps`` (a,)."""
+
+    def __init__(self, resource: Resource, steps: StepArrays) -> None:
+        self._resource, self._steps = resource, steps
+        self.first = np.array(resource.start, dtype=float)
+        self.dominated, self.ends = resource.dominated, resource.ends  # type: ignore[method-assign]
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        return self._resource.extended(self._steps.only(arc), values)
+
+
+class Sums(Carried):
+    """Sums of amounts of arcs (a, q) within limits (q,); ``left`` (n, q): least from a state on."""
+
+    def __init__(self, amounts: Floats, limits: Floats, left: Floats) -> None:
+        self._amounts, self.limits, self._left = amounts, limits, left
+        self.first = np.zeros(amounts.shape[1])
+
+    def extend(self, arc: Ints, values: Floats) -> Floats:
+        return np.asarray(values + self._amounts[arc])
+
+    def totals(self, values: Floats) -> Floats:
+        return values
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        return np.asarray(values + self._left[state])
+
+
+class CappedSums(Sums):
+    """Costs (m,) and capped amounts (m, B) of moves; ``multipliers`` (B,): of the caps, from 0.
+
+    Costs are bounded by their Lagrangian, capped sums by the least of each alone.
+    """
+
+    def __init__(
+        self, graph: Graph, costs: Floats, amounts: Floats, caps: Floats, multipliers: Floats
+    ) -> None:
+        least = (costs + amounts @ multipliers, *amounts.T)
+        left = np.column_stack([distances(graph, each, back=True) for each in least])
+        super().__init__(np.column_stack([costs, amounts]), np.array([np.inf, *caps]), left)
+        self._multipliers, self._paid_back = multipliers, float(multipliers @ caps)
+
+    def bounds(self, state: Ints, values: Floats) -> Floats:
+        priced = values[:, 0] + values[:, 1:] @ self._multipliers - self._paid_back
+        return np.asarray(np.column_stack([priced, values[:, 1:]]) + self._left[state])
+
+
+class Joint:
+    """Labels of several resources side by side, over arcs that are sorted by their sources.
+
+    ``graph``: has the ends; ``levels`` (n,): no arc leads to a lower one; ``arcs``: sources and
+    targets (a,), which may stand there several times, by default the moves of the graph;
+    ``look_back``: with how many labels of its state one is compared.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        carried: Sequence[Carried],
+        levels: Ints | None = None,
+        arcs: tuple[Ints, Ints] | None = None,
+        look_back: int = 32,
+    ) -> None:
+        source, target = (graph.source, graph.target.astype(np.int64)) if arcs is None else arcs
+        self.ends, self.target, self.look_back = graph.ends, target, look_back
+        self.levels = np.zeros(graph.states, dtype=np.int64) if levels is None else levels
+        self.starts = np.searchsorted(source, np.arange(graph.states + 1))
+        self.first = np.concatenate([each.first for each in carried])[None]
+        self.limits = np.concatenate([each.limits for each in carried])
+        cuts = np.cumsum([0, *(len(each.first) for each in carried)]).tolist()
+        self._own = [(c, slice(*cut)) for c, cut in zip(carried, pairwise(cuts), strict=True)]
 
     def follow(self, labels: Labels, arc: Ints) -> Floats:
         """Return the values of labels after an arc each, (N, k); infinite if infeasible."""
+        return np.hstack([each.extend(arc, labels.taken[:, own]) for each, own in self._own])
 
     def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return lower bounds (N, b), over all completions of labels, of all limited values."""
+        """Return lower bounds (N, b), over all completions of labels, of limited values."""
+        return np.hstack([each.bounds(state, taken[:, own]) for each, own in self._own])
 
     def values(self, taken: Floats, aim: int) -> Floats:
-        """Return the objective (N,) of paths that end with labels; infinite if none may."""
+        """Return a limited value of paths that end with labels; infinite if none may end so."""
+        found = np.hstack([each.totals(taken[:, own]) for each, own in self._own])[:, aim]
+        may = np.all([each.ends(taken[:, own]) for each, own in self._own], axis=0)
+        return np.where(may, found, np.inf)
 
     def dominated(self, first: Floats, other: Floats) -> Bools:
-        """Return where the first of two labels of a state, (N, k) each, dominates the other."""
+        """Return where the first labels (N, k) dominate the others in every resource."""
+        parts = [each.dominated(first[:, own], other[:, own]) for each, own in self._own]
+        return np.asarray(np.all(parts, axis=0))
 
 
 @dataclass
@@ -121,7 +219,7 @@ class Sweep:
     """
 
     def __init__(
-        self, growth: _Growth, limits: Floats, *, aim: int = 0, width: int | None = None
+        self, growth: Joint, limits: Floats, *, aim: int = 0, width: int | None = None
     ) -> None:
         self._growth, self._limits = growth, np.array(limits, dtype=float)
         self._aim, self._width, self._found = aim, width, Swept()
@@ -208,7 +306,7 @@ class Sweep:
         self._found.path = tuple(self._growth.target[self._found.arcs].tolist())
 
 
-def _undominated(fresh: Labels, known: Sequence[Labels], growth: _Growth) -> Labels:
+def _undominated(fresh: Labels, known: Sequence[Labels], growth: Joint) -> Labels:
     """Return the new labels that no known or new one is found to dominate."""
     states = np.zeros(len(growth.ends), dtype=bool)
     states[fresh.state] = True
@@ -237,7 +335,7 @@ class LabelSearch(NamedTuple):
 
 
 def widening(
-    growth: _Growth,
+    growth: Joint,
     caps: Floats,
     best: LabelSearch,
     watch: Watch,
@@ -266,144 +364,3 @@ def widening(
             break
         width = min(width * WIDER, most)
     return best
-
-
-class SummedLabels:
-    """Labels of sums of the amounts of moves, (m, k)."""
-
-    look_back = 32
-
-    def __init__(self, graph: Graph, amounts: Floats) -> None:
-        self.ends, self.levels = graph.ends, np.zeros(graph.states, dtype=np.int64)
-        self.starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-        self.target, self.first = graph.target.astype(np.int64), np.zeros((1, amounts.shape[1]))
-        self._amounts = amounts
-
-    def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return sums after an arc each."""
-        return np.asarray(labels.taken + self._amounts[arc])
-
-    def dominated(self, first: Floats, other: Floats) -> Bools:
-        """Return where no sum is larger."""
-        return np.asarray((first <= other).all(axis=1))
-
-
-class CappedSums(SummedLabels):
-    """Labels of the costs (m,) and capped amounts (m, B) of moves, with Lagrangian bounds.
-
-    ``multipliers`` (B,): of the caps, from 0.
-    """
-
-    def __init__(
-        self, graph: Graph, costs: Floats, amounts: Floats, caps: Floats, multipliers: Floats
-    ) -> None:
-        super().__init__(graph, np.column_stack([costs, amounts]))
-        self._multipliers, self._paid_back = multipliers, float(multipliers @ caps)
-        self._rest = distances(graph, costs + amounts @ multipliers, back=True)
-        self._least = np.column_stack([distances(graph, own, back=True) for own in amounts.T])
-
-    def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return Lagrangian bounds of costs, and lower bounds of capped sums, (N, 1 + B)."""
-        priced = taken[:, 0] + taken[:, 1:] @ self._multipliers - self._paid_back
-        return np.column_stack([priced + self._rest[state], taken[:, 1:] + self._least[state]])
-
-    def values(self, taken: Floats, aim: int) -> Floats:
-        """Return the costs of paths, (N,)."""
-        return np.asarray(taken[:, aim])
-
-
-class Carried:
-    """A resource on the arcs of a graph; here one that limits nothing beyond its extension.
-
-    ``first`` (k,): values at the start; ``limits`` (b,): upper limits of its limited values.
-    """
-
-    first: Floats
-    limits: Floats = np.zeros(0)
-
-    def extend(self, arc: Ints, values: Floats) -> Floats:
-        """Return values (N, k) after arcs (N,); infinite where they may not be taken."""
-        raise NotImplementedError
-
-    def totals(self, values: Floats) -> Floats:
-        """Return the limited values (N, b) of paths that end with labels."""
-        return values[:, :0]
-
-    def bounds(self, state: Ints, values: Floats) -> Floats:
-        """Return lower bounds (N, b), over all completions of labels, of the limited values."""
-        return self.totals(values)
-
-    def dominated(self, first: Floats, other: Floats) -> Bools:
-        """Return where the first values (N, k) dominate the others."""
-        return np.asarray((first <= other).all(axis=1))
-
-    def ends(self, values: Floats) -> Bools:
-        """Return with which values a path may end, (N,)."""
-        return np.ones(len(values), dtype=bool)
-
-
-class Asked(Carried):
-    """A resource of a problem on the arcs of a graph, ``steps`` (a,)."""
-
-    def __init__(self, resource: Resource, steps: StepArrays) -> None:
-        self._resource, self._steps = resource, steps
-        self.first = np.array(resource.start, dtype=float)
-        self.dominated, self.ends = resource.dominated, resource.ends  # type: ignore[method-assign]
-
-    def extend(self, arc: Ints, values: Floats) -> Floats:
-        return self._resource.extended(self._steps.only(arc), values)
-
-
-class Sums(Carried):
-    """Sums of amounts of arcs (a, q) within caps (q,); ``left`` (n, q): least from a state on."""
-
-    def __init__(self, amounts: Floats, caps: Floats, left: Floats) -> None:
-        self._amounts, self.limits, self._left = amounts, caps, left
-        self.first = np.zeros(len(caps))
-
-    def extend(self, arc: Ints, values: Floats) -> Floats:
-        return np.asarray(values + self._amounts[arc])
-
-    def totals(self, values: Floats) -> Floats:
-        return values
-
-    def bounds(self, state: Ints, values: Floats) -> Floats:
-        return np.asarray(values + self._left[state])
-
-
-class Joint:
-    """Labels of several resources side by side, over arcs that are sorted by their sources.
-
-    ``graph``: has the ends; ``levels`` (n,); ``source``, ``target`` (a,): of arcs, which may stand
-    there several times.
-    """
-
-    def __init__(
-        self, graph: Graph, levels: Ints, arcs: tuple[Ints, Ints], carried: Sequence[Carried]
-    ) -> None:
-        self.ends, self.levels = graph.ends, levels
-        self.starts = np.searchsorted(arcs[0], np.arange(graph.states + 1))
-        self.target, self.look_back = arcs[1], len(arcs[1])
-        self.first = np.concatenate([each.first for each in carried])[None]
-        self.limits = np.concatenate([each.limits for each in carried])
-        cuts = np.cumsum([0, *(len(each.first) for each in carried)]).tolist()
-        self._own = [(c, slice(*cut)) for c, cut in zip(carried, pairwise(cuts), strict=True)]
-
-    def follow(self, labels: Labels, arc: Ints) -> Floats:
-        """Return the values of labels after an arc each, (N, k)."""
-        return np.hstack([each.extend(arc, labels.taken[:, own]) for each, own in self._own])
-
-    def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return lower bounds (N, b) of limited values, over all completions of labels."""
-        return np.hstack([each.bounds(state, taken[:, own]) for each, own in self._own])
-
-    def values(self, taken: Floats, aim: int) -> Floats:
-        """Return a limited value of paths that end with labels; infinite if none may end so."""
-        found = np.hstack([each.totals(taken[:, own]) for each, own in self._own])[:, aim]
-        may = np.all([each.ends(taken[:, own]) for each, own in self._own], axis=0)
-        return np.where(may, found, np.inf)
-
-    def dominated(self, first: Floats, other: Floats) -> Bools:
-        """Return where the first labels (N, k) dominate the others in every resource."""
-        parts = [each.dominated(first[:, own], other[:, own]) for each, own in self._own]
-        return np.asarray(np.all(parts, axis=0))

@@ -11,11 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint
-from typing import Any
+from typing import Any, NamedTuple
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of, plugins
-from seqopt.graph.graph import LabelProof
 from seqopt.problem.problem import Aim
 from seqopt.scene.scene import Order
 from seqopt.work.progress import Clock
@@ -403,6 +402,23 @@ def as_formulation(given: object, *questions: str) -> Formulation:
             f"use {' or '.join(formulations(*questions))}"
         )
     return given
+
+
+class LabelProof(NamedTuple):
+    """Labels of a build in time that show that no path is better in one goal.
+
+    Every successor of a label by one act is a label that another one of these
+    dominates, or a bound by multipliers and sums to go says that it is no better.
+
+    ``states`` (N, 1 + c): how many bricks stand, and entries of a state; ``labels`` (N,
+    1 + c + q): when the last step ended, since when robots of columns are free, zero where they
+    hold, and sums of budgets and of goals before; ``prices`` (L, 1 + c): of the time of all, and of
+    the robots of columns.
+    """
+
+    states: Ints
+    labels: Floats
+    prices: Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,8 +16,18 @@ from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt._registry import Later
 from seqopt.errors import FileError, ProblemError
-from seqopt.graph.graph import NOW, Graph, TimedGraph
-from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
+from seqopt.graph.graph import Graph
+from seqopt.graph.instance import (
+    NOW,
+    PEAK,
+    SUM,
+    TAIL,
+    Instance,
+    TimedGraph,
+    _by_goal,
+    _Cap,
+    _Target,
+)
 from seqopt.instances._program import as_mps
 from seqopt.scene._checks import short
 

@@ -12,12 +12,21 @@ import numpy as np
 from seqopt._registry import offered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.graph import Graph, TimedGraph
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
-from seqopt.graph.paths import _on_paths, contracted
-from seqopt.graph.states.explored import build_space
-from seqopt.graph.states.states import States
+from seqopt.graph._spaces import build_space
+from seqopt.graph.graph import Graph, _on_paths, contracted
+from seqopt.graph.instance import (
+    PEAK,
+    SUM,
+    TAIL,
+    TIME,
+    Instance,
+    TimedGraph,
+    _by_goal,
+    _Cap,
+    _Target,
+)
+from seqopt.graph.space import Explorer, Visited
+from seqopt.graph.states import States
 from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import without_shares
 from seqopt.problem.problem import Aim, Problem

@@ -25,11 +25,10 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
-from seqopt.graph._labels import CappedSums, Sweep, Swept
+from seqopt.graph._labels import CappedSums, Joint, Sweep, Swept
 from seqopt.graph.formulation import Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import _to_go, least_sum, moves_out, strictly_below, tied
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.graph.graph import Graph, _to_go, least_sum, moves_out, strictly_below, tied
+from seqopt.problem.requirements import Resource, StepArrays
 
 MIXTURES = 80  # multipliers that are tried
 DEAREST = 1e7  # largest multiplier, over what a path costs per unit of a cap
@@ -147,9 +146,9 @@ def _best_multipliers(case: _Case, start: Floats) -> _Ascent:
 
 def _swept(case: _Case, multipliers: Floats) -> Swept:
     """Return labels of partial paths below the value and within the caps, and the best path."""
-    growth = CappedSums(case.graph, case.costs, case.takes, case.caps, multipliers)
+    sums = CappedSums(case.graph, case.costs, case.takes, case.caps, multipliers)
     limits = np.array([strictly_below(case.value), *case.caps])
-    return Sweep(growth, limits, width=MOST).run(Watch())
+    return Sweep(Joint(case.graph, [sums]), limits, width=MOST).run(Watch())
 
 
 def _by_labels(case: _Case, multipliers: Floats) -> float:

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.states.states import States
+from seqopt.arrays import Bools, Floats, Ints, KnownRows
+from seqopt.graph.states import States
 from seqopt.judge._rule_moves import Choices
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values
 from seqopt.problem.amounts import LARGEST, StateArrays
-from seqopt.responses._grip_sets import Block, KnownRows, solve_sets
+from seqopt.responses._grip_sets import Block, solve_sets
 from seqopt.responses.quantities import robot_response
 
 Responses = Mapping[str, Floats]

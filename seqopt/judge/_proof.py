@@ -16,13 +16,12 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._orders import order_rules
-from seqopt.graph.formulation import Solution
-from seqopt.graph.graph import Graph, LabelProof
-from seqopt.graph.instance import PEAK, SUM, TIME, _Target
-from seqopt.graph.paths import (
+from seqopt.graph._spaces import order_rules
+from seqopt.graph.formulation import LabelProof, Solution
+from seqopt.graph.graph import (
     FAILS,
     PASSES,
+    Graph,
     _lazy_path,
     cut,
     lexicographic,
@@ -30,7 +29,8 @@ from seqopt.graph.paths import (
     potentials,
     reached,
 )
-from seqopt.graph.states.states import States
+from seqopt.graph.instance import PEAK, SUM, TIME, _Target
+from seqopt.graph.states import States
 from seqopt.judge._bounds import Book, Closed, TwinBook, is_beyond, limit_below
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, places
@@ -38,7 +38,7 @@ from seqopt.judge._twin import twin_of
 from seqopt.judge.arithmetic import Stage, budget_bounds, next_stage, only_below, sum_books
 from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
-from seqopt.problem.resources import StepArrays
+from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence.rules import RuleBook
 

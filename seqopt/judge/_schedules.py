@@ -16,9 +16,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError, StepError
-from seqopt.graph._orders import order_rules
+from seqopt.graph._spaces import order_rules
 from seqopt.graph.formulation import Solution
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.judge._candidates import depends_on_robots, values_by_level
 from seqopt.judge._proof import BELOW, Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free
@@ -27,8 +27,7 @@ from seqopt.judge._step_checks import check_props, check_shape, proven_margins
 from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.judge.certificate import TOLERANCE, Basis, Certificate
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
-from seqopt.problem.resources import StepArrays, _first_fault
-from seqopt.problem.standing import _size, slack
+from seqopt.problem.requirements import StepArrays, _first_fault
 from seqopt.responses._tolerance import is_tolerance, misfits_along, step_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, EXCESS_COLUMN, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
@@ -36,6 +35,7 @@ from seqopt.scene.scene import Order, check_postures
 from seqopt.sequence.rules import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability.standing import _size, slack
 
 ENDED = ("time", "memory", "interrupt")  # searches that were stopped: no bound is proven
 Bounds = tuple[float, ...]

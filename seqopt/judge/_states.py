@@ -11,18 +11,18 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.paths import strictly_below, tied
-from seqopt.graph.states.states import States
+from seqopt.graph.graph import strictly_below, tied
+from seqopt.graph.states import States
 from seqopt.judge._candidates import LevelTables, depends_on_robots
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
 from seqopt.judge._step_checks import props_that_hold
 from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import Block, solve_sets
 from seqopt.sequence.rules import RuleBook
 from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing, StandingSets
 
 Tables: TypeAlias = RuleTables | ScheduleTables
 """What rules or a schedule allow, level by level."""

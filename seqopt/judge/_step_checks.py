@@ -13,14 +13,14 @@ import numpy as np
 
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import SolverError
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
-from seqopt.problem.standing import Standing, slack
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, step_verdicts
 from seqopt.stability.assessment import MARGINS, Stability, Verdict
+from seqopt.stability.standing import Standing, slack
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 _UNFELT = 1e-3  # of the mean weight of a brick, far more than forces err

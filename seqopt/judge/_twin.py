@@ -15,7 +15,7 @@ import numpy as np
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.graph import TimedGraph
+from seqopt.graph.instance import TimedGraph
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
 from seqopt.problem.requirements import Limit
 from seqopt.responses._tolerance import is_tolerance

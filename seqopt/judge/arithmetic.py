@@ -11,13 +11,12 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import ROUNDING, TIED, Graph, cut, least_sum, tied
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
-from seqopt.graph.paths import ROUNDING, TIED, cut, least_sum, tied
 from seqopt.judge._bounds import Book, Closed, SumBook, TwinBook, least_within, limit_below
 from seqopt.judge._twin import path_twin
 from seqopt.judge.certificate import TOLERANCE, Certificate
-from seqopt.problem.resources import _first_fault
+from seqopt.problem.requirements import _first_fault
 
 BELOW = 1e-9  # by how much a path must be better, over the size of the value
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven

@@ -39,7 +39,7 @@ class Certificate(FrozenValue):
     gap : float
         Largest difference of value and bound, relative to the size of the values: of the costs
         that a choice of candidates meets, their sum or the largest. Infinite where nothing is
-        proven; margins of stability are proven to `seqopt.problem.standing.NARROW`.
+        proven; margins of stability are proven to `seqopt.stability.standing.NARROW`.
     claimed_gap : float
         Gap to the formulation's own bound, if that is higher; it is not proven.
     spent : mapping of str to float

@@ -28,8 +28,15 @@ from seqopt.errors import (
     TimeUpError,
     message_of,
 )
-from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch, timed
-from seqopt.graph.graph import LabelProof
+from seqopt.graph.formulation import (
+    Formulation,
+    FormulationKind,
+    LabelProof,
+    Run,
+    Solution,
+    Watch,
+    timed,
+)
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
 from seqopt.judge.certificate import TOLERANCE, Certificate

@@ -18,31 +18,30 @@ import numpy as np
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
-from seqopt.graph._explore import Explorer
-from seqopt.graph._orders import TooManySetsError
-from seqopt.graph.instance import Instance, _Cap
-from seqopt.graph.paths import distances, least_peak, least_sum, tied
-from seqopt.graph.states.explored import (
-    STEPS,
+from seqopt.graph._spaces import (
+    FEWEST,
     WORST,
     StandingLook,
+    TooManySetsError,
     barred,
     bisected,
     explore,
     with_margin,
 )
-from seqopt.graph.states.states import States
+from seqopt.graph.graph import distances, least_peak, least_sum, tied
+from seqopt.graph.instance import Instance, _Cap
+from seqopt.graph.space import Explorer
+from seqopt.graph.states import States
 from seqopt.judge._bounds import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
-from seqopt.problem.filters import IGNORED, STANDING
-from seqopt.problem.requirements import Excess, Limit
-from seqopt.problem.standing import Standing
+from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.sequence.rules import FREE, RuleBook, unbearable
 from seqopt.sequence.schedule import OpenStep, loads
+from seqopt.stability.standing import Standing
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -111,7 +110,7 @@ def confirmed(
     """
     look, capped = Look(time.perf_counter() + seconds), problem.goals[len(problem.aims) :]
     own = (goal for goal in problem.aims if goal.of_criterion)  # whose values may be infinite
-    steps = replace(_with_any_margin(problem), goals=(*STEPS, *own, *capped))
+    steps = replace(_with_any_margin(problem), goals=(*FEWEST, *own, *capped))
     try:
         hint = None
         if barred(steps) is None:
@@ -189,14 +188,14 @@ class Look:
 
     def exists(self, problem: States) -> bool:
         """Return whether a problem is feasible; stability is proven only of the states needed."""
-        problem = replace(problem, goals=STEPS)
+        problem = replace(problem, goals=FEWEST)
         if not problem.demands:
             return self(problem).whole
         return barred(problem) is None and self.standing(problem).exists(problem)
 
     def standing(self, problem: States) -> StandingLook:
         """Return the states without the stability requirement, which is checked lazily."""
-        return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
+        return StandingLook(replace(problem, goals=FEWEST, standing=None, settled=()), self.tell)
 
     def least(self, problem: States, response: str) -> float:
         """Return the least peak of a response over all plans, SI units; infinite if infeasible.
@@ -218,7 +217,7 @@ def _why_impossible(problem: States, look: Look) -> str:
     problem = _with_any_margin(replace(problem, engine=engine))
     where, finished = "no plan is allowed", False
     try:
-        steps = replace(problem, goals=STEPS)
+        steps = replace(problem, goals=FEWEST)
         if (state := barred(steps)) is not None:
             whole = problem.space.bricks_at(state[0]) == len(problem.network.inner)
             finished = whole and not problem.space.grips(state[1]).any()
@@ -372,7 +371,7 @@ def _beyond(network: Network, force: float) -> str:
 
 def _bond(problem: States, look: Look) -> str:
     """Return the least bond, Pa, with which a plan exists, in words; found by bisection."""
-    own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
+    own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=FEWEST)
     states = look.standing(bare)
 
     def exists(bond: float) -> bool:

@@ -10,11 +10,10 @@ from math import inf, isfinite
 from typing import Any
 
 from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph._candidates import walk
+from seqopt.graph._spaces import barred, steps_in_hands
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch
-from seqopt.graph.states._visits import steps_in_hands
-from seqopt.graph.states.explored import barred
-from seqopt.graph.states.states import States
-from seqopt.graph.states.walk import walk
+from seqopt.graph.states import States
 from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.plan._answers import Found, called, proven, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt._registry import Shown, display, offered
+from seqopt._showing import Page
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
-from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import COLUMN, step_tolerance
 from seqopt.responses.quantities import _props_table
 from seqopt.responses.table import (
@@ -31,6 +31,7 @@ from seqopt.responses.table import (
 from seqopt.sequence.steps import Site, Step, _check_part
 from seqopt.stability._steps import assess_steps, stability_table, step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
+from seqopt.stability.standing import Standing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,13 +14,11 @@ import pandas as pd
 from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._spaces import explore
 from seqopt.graph.formulation import Formulation, Solution, as_formulation
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.space import Space
-from seqopt.graph.states.explored import explore
-from seqopt.graph.states.states import States
+from seqopt.graph.graph import Graph, distances, fewest_moves, keep_best, reached
+from seqopt.graph.space import Explorer, Space, Visited
+from seqopt.graph.states import States
 from seqopt.judge._schedules import ordered, plan_values
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._answers import called, readable, with_numbers

@@ -17,13 +17,12 @@ from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
-from seqopt.problem.standing import Standing
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import length_text
@@ -38,6 +37,7 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.stability._steps import stability_table
+from seqopt.stability.standing import Standing
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -295,7 +295,7 @@ class Plan(ShownBuild):
         fields = _each_fields(self.engine, self.steps, Want.ALL)
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        columns.update(self._of_scene.step_columns(self.steps))
+        columns.update(self._of_scene.rules.step_columns(self.steps))
         return columns
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
@@ -344,7 +344,7 @@ class Plan(ShownBuild):
             **self._answer(),
             "budgets": graph.spent(self.objective, self.selection),
             "steps": len(self.steps),
-            "steps_before_release": len(self.steps) - graph.letting_go(self.steps),
+            "steps_before_release": len(self.steps) - graph.rules.letting_go(scene, self.steps),
             "regrips": self.regrips,
             "makespan": self.makespan,
             "idle_robots": list(idle_robots(scene, self.steps)),

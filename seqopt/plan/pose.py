@@ -10,17 +10,17 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import ProblemError
-from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.graph.states import States, build_states, over_scenarios, within
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.problem.filters import Filter
+from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
-from seqopt.problem.requirements import Criterion, Limit, require_parts
-from seqopt.problem.standing import Standing
+from seqopt.problem.requirements import Filter, Limit, require_parts
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing
 
 if TYPE_CHECKING:
     from seqopt.scene.scenarios import Scenarios
@@ -140,7 +140,7 @@ def _of_states(problem: Problem) -> States:
         raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
     if problem.paths:
         raise ProblemError(f"resource {problem.paths[0]}: it is kept in one order; give an order")
-    from seqopt.graph._orders import among_orders  # noqa: PLC0415  # few problems seek an order
+    from seqopt.graph._spaces import among_orders  # noqa: PLC0415  # few problems seek an order
 
     return among_orders(_states(problem), problem.orders)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from seqopt._registry import offered
 from seqopt.errors import SeqoptError, StepError
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import plan_values
 from seqopt.plan.plan import Plan

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, message_of
 from seqopt.graph.formulation import End, Formulation, Run, as_formulation
 from seqopt.graph.instance import Instance
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.plan._answers import find_path, require_time
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import default_formulation, graph_of

@@ -14,8 +14,7 @@ the whole path so far.
 """
 
 from seqopt.problem.amounts import Amount
-from seqopt.problem.filters import Filter, register
-from seqopt.problem.requirements import Criterion, Limit
-from seqopt.problem.resources import Resource, StepArrays
+from seqopt.problem.criteria import Criterion
+from seqopt.problem.requirements import Filter, Limit, Resource, StepArrays, register
 
 __all__ = ["Amount", "Criterion", "Filter", "Limit", "Resource", "StepArrays", "register"]

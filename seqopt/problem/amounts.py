@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees, pi
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,12 +22,12 @@ import numpy as np
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError, did_you_mean, message_of
-from seqopt.problem.requirements import Criterion, state_costs
-from seqopt.problem.standing import MARGINS, StandingSets
+from seqopt.problem.criteria import Criterion, state_costs
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, OFFERED, TOLERANCE
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
+from seqopt.stability.standing import MARGINS, StandingSets
 
 LARGEST = "F_largest"
 STATE_RESPONSES = (*OFFERED, LARGEST, TOLERANCE)
@@ -244,14 +245,6 @@ def _one(moves: MoveArrays) -> Floats:
     return np.ones(len(moves.regrips))
 
 
-def _regrips(moves: MoveArrays) -> Floats:
-    return moves.regrips
-
-
-def _distances(moves: MoveArrays) -> Floats:
-    return moves.distances
-
-
 def _fewest_steps(space: Any) -> float:
     return float(space.steps_to_go(space.first, space.start())[0])
 
@@ -264,25 +257,13 @@ def _tilt_survived(value: float) -> float:
 MINMAX = Amount("minmax", _costs, is_peak=True, of_criterion=True)
 SUM = Amount("sum", _costs, of_criterion=True)
 STEPS = Amount("steps", moves=_one, least=_fewest_steps)
-REGRIPS = Amount("regrips", moves=_regrips)
-TRAVEL = Amount("travel", moves=_distances, unit="m", needs_stays=True)
+REGRIPS = Amount("regrips", moves=attrgetter("regrips"))
+TRAVEL = Amount("travel", moves=attrgetter("distances"), unit="m", needs_stays=True)
 _SHOWN = {"tilt": _tilt_survived}
-BUILT_IN = {
-    amount.name: amount
-    for amount in (
-        *(MINMAX, SUM, STEPS, REGRIPS, TRAVEL),
-        *map(worst, STATE_RESPONSES),
-        *(
-            Amount(name, margins=_Margin(name), is_peak=True, show=_SHOWN.get(name))
-            for name in MARGINS
-        ),
-        *(
-            Amount(f"sum({name})", _Response(name), responses=(name,))
-            for name in STATE_RESPONSES
-            if name != TOLERANCE
-        ),
-    )
-}
+_BOUNDS = [Amount(n, margins=_Margin(n), is_peak=True, show=_SHOWN.get(n)) for n in MARGINS]
+_TOTALS = [Amount(f"sum({n})", _Response(n), responses=(n,)) for n in (*OFFERED, LARGEST)]
+_EVERY = (MINMAX, SUM, STEPS, REGRIPS, TRAVEL, *map(worst, STATE_RESPONSES), *_BOUNDS, *_TOTALS)
+BUILT_IN = {amount.name: amount for amount in _EVERY}
 """Amounts that are always there, by name."""
 
 

@@ -13,23 +13,91 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.errors import ProblemError, message_of
-from seqopt.problem.requirements import (
-    NEVER,
-    ROUNDED,
-    SCALED,
-    ChoiceResponses,
-    Criterion,
-    SceneFacts,
-)
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import robot_response
+from seqopt.responses.scales import NEVER, SCALED, SceneFacts
 from seqopt.scene._checks import short
+
+ROUNDED = (
+    ("F", 0.0278513762761887),
+    ("T", 0.0278513762761887),
+    ("C", 0.0278513762761887),
+    ("M", 0.11321697673247444),
+    ("D", 8.531988813508194),
+)
+"""What ranks round responses to, by first letter, in the units of `Units`.
+
+About a thirty-sixth of a brick's weight, a ninth of it at a brick's length, and eight times
+what a joint gives way under it: 1 N, 1 N m and 1e-6 m on the arch of Bruun et al., whose published
+choices speak for such a rounding.
+"""
+
+
+ChoiceResponses = Mapping[str, Floats]
+
+
+class Criterion(Protocol):
+    """What a step costs."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs of a move.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """The numbers that it uses, for the summary, ready for JSON."""
+
+    def for_scene(self, facts: SceneFacts) -> Criterion:
+        """Return the criterion with everything that it takes from a scene filled in.
+
+        Parameters
+        ----------
+        facts : SceneFacts
+            Robots, crown, units and scales of the scene.
+
+        Returns
+        -------
+        Criterion
+            With ``F_each`` spelled out for the robots, and no number left open.
+        """
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the costs of all choices in one step.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
+        bricks : int
+            Bricks that stand in the step; of ranks, at the move that decides it: the later of two.
+        choices : int
+            How many candidates that move has.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+        """
 
 
 class Ranked(Enum):
@@ -365,3 +433,20 @@ class StepCost:
                 f"choice at {bricks} bricks; give a number, or inf for what is not allowed"
             )
         return np.where(impossible, np.nan, found)
+
+
+def state_costs(
+    criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
+) -> Floats:
+    """Return costs of states (n,), infinite where they are infeasible (n,).
+
+    Steps can be added to a plan, so none that counts may cost less than nothing. ``found`` has
+    responses (n,), SI units.
+    """
+    costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
+    if (costs < 0).any():
+        raise ProblemError(
+            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; none "
+            "may cost less than zero: add a constant"
+        )
+    return costs

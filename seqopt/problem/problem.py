@@ -16,31 +16,30 @@ import numpy as np
 
 from seqopt._registry import Shown, registered
 from seqopt.arrays import Floats
-from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, STATE_RESPONSES, Amount, parse_goals, steps_over
-from seqopt.problem.criteria import RankSum, _counts_every_step
-from seqopt.problem.filters import Filter, parse_limits
+from seqopt.problem.criteria import Criterion, RankSum, _counts_every_step
 from seqopt.problem.requirements import (
     LINEAR_RANGE,
-    Criterion,
+    Filter,
     Limit,
-    SceneFacts,
+    Resource,
     _prop_limits,
     _step_limits,
     as_limits,
+    parse_limits,
 )
-from seqopt.problem.resources import Resource
-from seqopt.problem.standing import Standing
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
+from seqopt.responses.scales import SceneFacts
 from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing, as_standing
 
 
 class Aim(Enum):
@@ -48,11 +47,6 @@ class Aim(Enum):
 
     SUM = "sum"
     PEAK = "peak"
-
-    @property
-    def join(self) -> np.ufunc:
-        """How costs go together."""
-        return np.add if self is Aim.SUM else np.maximum
 
 
 class RobustKind(Enum):
@@ -104,12 +98,6 @@ class RobustAim:
             return 1.0
         return min(1.0, 1.0 / ((1.0 - self.level) * count))
 
-    def ordered_weights(self, count: int) -> Floats:
-        """Return the weights (count,) of scenarios from the worst to the best; their sum is one."""
-        most = self.most(count)
-        weights = np.clip(1.0 - most * np.arange(count), 0.0, most)
-        return np.asarray(weights / weights.sum())
-
     def allowed(self, weights: Floats) -> Floats:
         """Return scenario weights (S,), projected to those that prove a bound on totals from 0.
 
@@ -123,9 +111,10 @@ class RobustAim:
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
     def each(self, values: Floats) -> Floats:
-        """Return one value (n,) from every row of values (n, S)."""
-        weights = self.ordered_weights(values.shape[1])
-        used = int(np.count_nonzero(weights))
+        """Return one value (n,) from every row of values (n, S), weighed from the worst down."""
+        most = self.most(values.shape[1])
+        weights = np.clip(1.0 - most * np.arange(values.shape[1]), 0.0, most)
+        weights, used = weights / weights.sum(), int(np.count_nonzero(weights))
         if used == 1:
             return np.asarray(values.max(axis=1))
         return np.asarray(np.sort(values, axis=1)[:, ::-1][:, :used] @ weights[:used])
@@ -140,12 +129,16 @@ def cvar(level: float) -> RobustAim:
     return RobustAim(RobustKind.CVAR, level)
 
 
-def parse_robust(text: str) -> RobustAim:
-    """Return an aim from words: ``worst-peak``, ``worst-total`` or as ``cvar=0.9``."""
+def parse_robust(given: RobustAim | str) -> RobustAim:
+    """Return an aim that is given as such, or in words: ``worst-peak``, ``cvar=0.9``."""
     known = {str(aim): aim for aim in (WORST_PEAK, WORST_TOTAL)}
-    if text in known:
-        return known[text]
-    name, _, number = text.partition("=")
+    if isinstance(given, RobustAim):
+        return given
+    if not isinstance(given, str):
+        raise ProblemError(f"robust aim {short(given)}: give worst-peak, worst-total or cvar=0.9")
+    if given in known:
+        return known[given]
+    name, _, number = given.partition("=")
     level = math.nan
     if name == RobustKind.CVAR.value:
         with suppress(ValueError):
@@ -154,7 +147,7 @@ def parse_robust(text: str) -> RobustAim:
         return cvar(level)
     hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
     raise ProblemError(
-        f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
+        f"robust aim {given} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
     )
 
 
@@ -387,23 +380,13 @@ def _goals(given: Sequence[Amount] | str, least: int = 0) -> tuple[Amount, ...]:
     return tuple(goals)
 
 
-def _over(given: RobustAim | str) -> RobustAim:
-    """Return an aim over scenarios that is given as such, or in words."""
-    aim = parse_robust(given) if isinstance(given, str) else given
-    if not isinstance(aim, RobustAim):
-        raise ProblemError(f"robust aim {short(aim)}: give worst-peak, worst-total or cvar=0.9")
-    return aim
-
-
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
     "limits": as_limits,
     "budgets": parse_budgets,
-    "stands": lambda given: (
-        given if isinstance(given, Standing | None) else Standing(find_mortar(given))
-    ),
+    "stands": as_standing,
     "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
-    "over": _over,
+    "over": parse_robust,
     "orders": lambda given: None if given is None else Orders.of(given),
 }
 

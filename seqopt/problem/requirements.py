@@ -1,224 +1,67 @@
-"""The requirements on a plan: a criterion, limits, what these need, and which steps exceed them."""
+r"""The requirements on a plan: limits, filters of states, resources of paths; what exceeds them.
+
+A filter answers twice, since what it asks may stay open. A plan passes states :math:`s` that are
+*proven to pass*; a proof leaves out those that are *proven not to*:
+
+.. math:: P = \{s : f(s) \text{ is proven}\}, \qquad R = \{s : \neg f(s) \text{ is proven}\}, \qquad
+   P \cap R = \emptyset .
+
+Limits, payloads, rules, standing and arms are filters of one kind. Each knows how it can be
+loosened, from which remedies of an infeasible problem are found.
+
+A resource is what depends on the whole path so far. A *label* of a state is what a path to it has
+come to, a vector :math:`z` that begins as :math:`z_0`, and a step from :math:`s` to :math:`s'`
+extends it,
+
+.. math:: z' = f(s, s', z), \qquad z' = \infty \; \text{ where the step may not follow this path.}
+
+Of two labels of one state the first *dominates* the other one if every extension of that one is
+feasible for it: by default where none of its values is larger, so :math:`f` must not fall in
+:math:`z`. When robots are free, how old mortar is and sums within budgets are carried by labels in
+the same way (`seqopt.graph._labels`). Further filters and resources are registered
+(`seqopt.register`) and named as limits.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats
+from seqopt._registry import ADDED, Part, registered
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
-from seqopt.errors import MechanismError, ProblemError, StepError
+from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.network.network import Network
-from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along
+from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call
+from seqopt.problem.criteria import Criterion
+from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import (
-    EXCESS_COLUMN,
     NO_TOLERANCE,
     OFFERED,
     PROP_EXCESS,
-    RESPONSES,
     TOLERANCE,
     _steps_in_words,
     length_text,
     robot_response,
 )
-from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_column
+from seqopt.responses.scales import _response_along
+from seqopt.responses.table import _Columns, _steps_in_table
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule, carried, loads
 from seqopt.sequence.steps import AnyStep
 
-LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
-NEVER = math.inf  # the brick count of a crown that is never reached
-OWN = " over payload, weight and size"  # what it is named after where no fixed method gives scales
-SCALED = ("F_largest", "M_sup", "T_max", "D_max")  # responses to which fixed methods give scales
-ROUNDED = (
-    ("F", 0.0278513762761887),
-    ("T", 0.0278513762761887),
-    ("C", 0.0278513762761887),
-    ("M", 0.11321697673247444),
-    ("D", 8.531988813508194),
-)
-"""What ranks round responses to, by first letter, in the units of `Units`.
-
-About a thirty-sixth of a brick's weight, a ninth of it at a brick's length, and eight times
-what a joint gives way under it: 1 N, 1 N m and 1e-6 m on the arch of Bruun et al., whose published
-choices speak for such a rounding.
-"""
 LARGEST = 1e100  # number: products of larger ones overflow
 CHOICE_RESPONSES = (*OFFERED, "F_move", "F_largest")  # of choices, and one per robot
 NAMES = (*CHOICE_RESPONSES, TOLERANCE)
 _LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Units:
-    """A force, a moment and a displacement that grow as a scene's responses do."""
-
-    force: float  # N; the mean weight of a brick
-    moment: float  # N m; that weight at the mean length of a brick
-    displacement: float  # m; that weight over the median translational stiffness of the joints
-
-    def of(self, response: str) -> float:
-        """Return the unit of a response, by its first letter: N, N m or m."""
-        return {"M": self.moment, "D": self.displacement}.get(response[0], self.force)
-
-
-def crown(scene: Scene) -> float:
-    """Return how many bricks are placed when a build reaches its crown.
-
-    The crown is the first of the highest bricks, by their centroids, if the build rises to it and
-    comes down again after it: `NEVER` where the build ends at its highest level, as that of a wall.
-    """
-    height = np.array([brick.position for brick in scene.placed]) @ np.array(scene.up)
-    level = LEVEL * max(float(np.ptp(height)), *scene.placed[0].dimensions)
-    low = height < height.max() - level
-    top = int(np.argmin(low))
-    return top + 1 if low[0] and low[top:].any() else NEVER
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SceneFacts:
-    """Numbers of a scene that criteria use, each computed when it is first needed."""
-
-    engine: Engine
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """Names of the scene's robots."""
-        return tuple(robot.name for robot in self.engine.network.scene.robots)
-
-    @cached_property
-    def crown(self) -> float:
-        """See `crown`."""
-        return crown(self.engine.network.scene)
-
-    @cached_property
-    def units(self) -> Units:
-        """The units of the scene, each 1 where it has no weight or no stiffness."""
-        network = self.engine.network
-        weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
-        length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
-        stiffness = network.springs.translational_stiffness
-        middle = float(np.median(stiffness[stiffness > 0])) if stiffness.any() else 1.0
-        return Units(weight, weight * length, weight / middle)
-
-    @property
-    def reference(self) -> Mapping[str, float]:
-        """The least that any fixed method reaches of each response's largest value, SI units.
-
-        Where no fixed method can build the scene, or none stands on the way: `own_scales`.
-        """
-        if not self._reached:
-            return self.own_scales
-        return {name: min(values[name] for values in self._reached) for name in SCALED}
-
-    @property
-    def own_scales(self) -> Mapping[str, float]:
-        """Scales that every scene has, SI units, for one that no fixed method builds.
-
-        Of grip forces it is the smallest payload; of ``T_max`` the weight of the structure, of
-        ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
-        """
-        scene = self.engine.network.scene
-        size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
-        size += max(max(brick.dimensions) for brick in scene.bricks)
-        weight = len(scene.bricks) * self.units.force
-        names = [*map(robot_response, self.robots), "F_largest"]
-        return dict.fromkeys(names, min(robot.payload for robot in scene.robots)) | {
-            "T_max": weight,
-            "M_sup": weight * float(size),
-            "D_max": len(scene.bricks) ** 2 * self.units.displacement,
-        }
-
-    @property
-    def basis(self) -> str:
-        """What is added to the name of a criterion where no fixed method gives scales."""
-        return "" if self._reached else OWN
-
-    @cached_property
-    def _reached(self) -> list[dict[str, float]]:
-        """The largest responses of every fixed method that can build the scene without props."""
-        engine, found, recipe = self.engine, [], recipe_of(self.engine)
-        if recipe is not None and engine.network.scene.props:
-            engine = recipe.make(engine.network.scene.with_props())
-        network = engine.network
-        for method in METHODS.values():
-            with suppress(StepError, MechanismError):
-                table = _analyzed(engine, method(network))
-                along = ((name, _response_along(network.scene, table, name)) for name in SCALED)
-                found.append({name: float(np.nanmax(values)) for name, values in along})
-        return found
-
-
-ChoiceResponses = Mapping[str, Floats]
-
-
-class Criterion(Protocol):
-    """What a step costs."""
-
-    @property
-    def name(self) -> str:
-        """What the criterion is called."""
-
-    def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses that it needs of a move.
-
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
-        """
-
-    @property
-    def settings(self) -> Mapping[str, object]:
-        """The numbers that the criterion uses, for the summary, ready for JSON."""
-
-    def for_scene(self, facts: SceneFacts) -> Criterion:
-        """Return the criterion with everything that it takes from a scene filled in.
-
-        Parameters
-        ----------
-        facts : SceneFacts
-            Robots, crown, units and scales of the scene.
-
-        Returns
-        -------
-        Criterion
-            With ``F_each`` spelled out for the robots, and no number left open.
-        """
-
-    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the costs of all choices in one step.
-
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
-        bricks : int
-            Bricks that stand in the step; of ranks, at the move that decides it: the later of two.
-        choices : int
-            How many candidates that move has.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            NaN where a choice is impossible.
-        """
 
 
 LIMIT_TOLERANCE = 1e-9  # by which a response may exceed a limit, over the limit's size
@@ -315,10 +158,7 @@ def _step_limits(given: Sequence[Limit] | Limit, scene: Scene) -> tuple[Limit, .
 
 def _said_limits(limits: Sequence[Limit]) -> dict[str, object]:
     """Return bounds by the names of limits, in display units, ready for JSON."""
-    return {
-        limit.label: limit.shown(limit.bound) if math.isfinite(limit.bound) else LIFTED
-        for limit in limits
-    }
+    return {e.label: e.shown(e.bound) if math.isfinite(e.bound) else LIFTED for e in limits}
 
 
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
@@ -346,23 +186,6 @@ def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
         return ()
     weight = sum(b.mass for b in scene.bricks) * math.hypot(*scene.gravity) * scene.weight_factor
     return (Limit(PROP_EXCESS, _LITTLE * (weight / len(scene.bricks) or 1.0)),)
-
-
-def state_costs(
-    criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
-) -> Floats:
-    """Return costs of states (n,), infinite where they are infeasible (n,).
-
-    Steps can be added to a plan, so none that counts may cost less than nothing. ``found`` has
-    responses (n,), SI units.
-    """
-    costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
-    if (costs < 0).any():
-        raise ProblemError(
-            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; none "
-            "may cost less than zero: add a constant"
-        )
-    return costs
 
 
 def require_parts(engine: Engine, moves: Schedule | FreeRules, criterion: Criterion) -> None:
@@ -435,9 +258,9 @@ def _carrying_excesses(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Excess, 
     """Return who carries bricks that are heavier than its payload, in the order of the robots."""
     out, every = [], [*carried(scene, steps)]
     for r, (robot, limit) in enumerate(zip(scene.robots, payload_limits(scene), strict=True)):
-        own, load = [each for each in every if each.robot == r], loads(scene, robot)
-        weighed = [(float(load[scene.since[each.brick] - 1]), each) for each in own]
-        over = [(load, each) for load, each in weighed if limit.exceeded(np.array(load))]
+        load = loads(scene, robot)
+        own = ((float(load[scene.since[e.brick] - 1]), e) for e in every if e.robot == r)
+        over = [(load, each) for load, each in own if limit.exceeded(np.array(load))]
         if over:
             numbers = tuple(sorted(each.step for _, each in over))
             most, worst = max(over)
@@ -450,25 +273,371 @@ def _prop_faults(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     return _excesses(scene, table, _prop_limits(scene))
 
 
-def _response_along(scene: Scene, table: _Columns, name: str) -> np.ndarray:
-    """Return a response of every step (steps,) as limits name it, but ``F_move``.
+class StepArrays(NamedTuple):
+    """Steps as resources see them, one beside each label: N steps, R robots.
 
-    They are in SI units, sizes without sign, NaN where the robot does not grip.
+    ``bricks`` (N,): how many stand after them; ``before``, ``after`` (N, R): the scene's nodes that
+    robots hold, robot by robot, -1 for none; robots that are alike may stand in any order. Of an
+    instance ``bricks`` is the level, and a row what its node stands for.
     """
-    if name == "C_max":
-        least = np.asarray(table[RESPONSES["F_min"].column], dtype=float)
-        return np.asarray(np.maximum(-least, 0.0))
-    if is_tolerance(name):
-        return misfits_along(table[COLUMN])
-    if name == PROP_EXCESS:
-        return np.asarray(table[EXCESS_COLUMN], dtype=float)
-    if name in RESPONSES:
-        response = RESPONSES[name]
-        return np.asarray(table[response.column], dtype=float) / response.scale
-    columns = {robot_response(robot.name): force_column(robot) for robot in scene.robots}
-    asked = columns.values() if name == "F_largest" else [columns[name]]
-    forces = np.abs([np.asarray(table[column], dtype=float) for column in asked])
-    return np.asarray(np.fmax.reduce(forces))
+
+    bricks: Ints
+    before: Ints
+    after: Ints
+
+    def only(self, rows: Ints) -> StepArrays:
+        """Select steps by their indices, (k,)."""
+        return StepArrays._make(each[rows] for each in self)
+
+
+@dataclass(frozen=True, repr=False)
+class Resource:
+    """What a path so far has come to, and with which steps it may go on.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for, among limits.
+    start : tuple of float
+        Values where builds begin, (k,).
+    extend : callable
+        Takes `StepArrays` and values before, (N, k); returns values after, infinite where a step
+        may not follow.
+    may_end : callable, optional
+        Takes values, (N, k); returns with which a build may end, (N,) bool; by default with any.
+    dominates : callable, optional
+        Takes values of two labels of one state, (N, k) each; returns where the first dominates,
+        (N,) bool; by default where no value is larger.
+    twin : Resource, optional
+        The same, written a second time, with which the judge follows plans and proves bounds;
+        without one the certificate says "claimed".
+
+    Examples
+    --------
+    >>> Resource("steps in all", (0.0,), lambda steps, values: values + 1.0)
+    Resource('steps in all')
+    """
+
+    name: str
+    start: tuple[float, ...] = field(compare=False)
+    extend: Callable[[StepArrays, Floats], Floats] = field(compare=False)
+    may_end: Callable[[Floats], Bools] | None = field(default=None, compare=False)
+    dominates: Callable[[Floats, Floats], Bools] | None = field(default=None, compare=False)
+    twin: Resource | None = field(default=None, compare=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        return f"Resource({self.name!r})"
+
+    def extended(self, steps: StepArrays, values: Floats) -> Floats:
+        """Return values after steps, (N, k); a `ProblemError` if its function fails."""
+        try:
+            found = np.asarray(self.extend(steps, values), dtype=float)
+        except Exception as error:  # foreign code may raise any error
+            raise ProblemError(
+                f"resource {self.name}: its function failed: {message_of(error)}"
+            ) from error
+        if found.shape != values.shape or np.isnan(found).any():
+            raise ProblemError(
+                f"resource {self.name}: its function returned shape {found.shape}; give numbers "
+                f"{values.shape}, a row for each label"
+            )
+        return found
+
+    def ends(self, values: Floats) -> Bools:
+        """Return with which values (N, k) a build may end, (N,)."""
+        if self.may_end is None:
+            return np.ones(len(values), dtype=bool)
+        return np.asarray(self.may_end(values), dtype=bool)
+
+    def dominated(self, first: Floats, other: Floats) -> Bools:
+        """Return where the first of two values (N, k) dominates the other one, (N,)."""
+        if self.dominates is None:
+            return np.asarray((first <= other).all(axis=1))
+        return np.asarray(self.dominates(first, other), dtype=bool)
+
+    def fault(self, steps: StepArrays) -> int | None:
+        """Return with which of the steps of a path, from 0, it is not kept; None if it is."""
+        values = np.array([self.start], dtype=float)
+        for k in range(len(steps.bricks)):
+            values = self.extended(steps.only(np.array([k])), values)
+            if not np.isfinite(values).all():
+                return k
+        return None if self.ends(values)[0] else len(steps.bricks) - 1
+
+    def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
+        """Yield relaxations of a problem: the resource left out."""
+        rest = tuple(other for other in problem.paths if other is not self)
+        yield f"the resource {self.name} left out", replace(problem, paths=rest)
+
+
+def _first_fault(resources: Sequence[Resource], steps: StepArrays) -> tuple[Resource, int] | None:
+    """Return a resource that a path does not keep, with its step from 0; None if all are kept.
+
+    Each is followed by its twin, and by itself.
+    """
+    for each in resources:
+        for own in (each.twin, each):
+            if own is not None and (at := own.fault(steps)) is not None:
+                return each, at
+    return None
+
+
+Passes = Callable[[StateArrays], Bools]
+Loosened = Callable[[Any], Iterator[tuple[str, Any]]]
+
+
+@dataclass(frozen=True, repr=False)
+class Filter:
+    """Which states a plan may pass.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for, among limits.
+    passes : callable or None
+        Takes `StateArrays`, returns which states are proven to pass, (n,) bool; None where moves
+        lead only to what passes.
+    responses : tuple of str
+        Those that it needs.
+    refuses : callable, optional
+        Returns which states are proven not to pass, (n,) bool; by default all others.
+    expensive : bool
+        Whether it is asked only of states that pass all other filters.
+    twin : callable, optional
+        An independent implementation of ``refuses``, with which the judge proves bounds; without
+        one the certificate says "claimed".
+    loosened : callable, optional
+        Takes a problem; yields a relaxation in words, and the relaxed problem. By default the
+        filter is left out.
+
+    Examples
+    --------
+    >>> Filter("two robots hold", lambda states: (states.nodes >= 0).sum(axis=1) == 2)
+    Filter('two robots hold')
+    """
+
+    name: str
+    passes: Passes | None = field(compare=False)
+    responses: tuple[str, ...] = ()
+    refuses: Passes | None = field(default=None, compare=False)
+    expensive: bool = False
+    twin: Passes | None = field(default=None, compare=False)
+    loosened: Loosened | None = field(default=None, compare=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        return f"Filter({self.name!r})"
+
+    def proven(self, states: StateArrays) -> Bools:
+        """Return which states are proven to pass, (n,)."""
+        if self.passes is None:
+            return np.ones(len(states.rows), dtype=bool)
+        return call(f"filter {self.name}", self.passes, states).astype(bool)
+
+    def refuted(self, states: StateArrays) -> Bools:
+        """Return which states are proven not to pass, (n,)."""
+        if self.refuses is None:
+            return ~self.proven(states)
+        return call(f"filter {self.name}", self.refuses, states).astype(bool)
+
+    def refuted_again(self, states: StateArrays) -> Bools:
+        """Return which states its twin proves not to pass, (n,); none without a twin."""
+        if self.twin is None:
+            return np.zeros(len(states.rows), dtype=bool)
+        return call(f"twin of filter {self.name}", self.twin, states).astype(bool)
+
+    def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
+        """Yield relaxations of a problem in this filter: in words, and the relaxed problem."""
+        if self.loosened is not None:
+            yield from self.loosened(problem)
+        else:
+            rest = _without(self, problem.filters)
+            yield f"the filter {self.name} left out", replace(problem, filters=rest)
+
+
+def _without(part: object, parts: Sequence[Any]) -> tuple[Any, ...]:
+    return tuple(other for other in parts if other is not part)
+
+
+def _limit_filter(limit: Limit) -> Filter:
+    """Return the filter of a limit on a response."""
+
+    def passes(states: StateArrays) -> Bools:
+        values = states.responses.get(limit.response)
+        return states.possible if values is None else ~limit.exceeded(values)
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        yield limit.label, replace(problem, limits=_without(limit, problem.limits))
+
+    return Filter(limit.label, passes, (limit.response,), loosened=loosened)
+
+
+IGNORED = "payload=ignored"
+STANDING = "no requirement to stand"
+PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
+ARMS = "arms that reach more, or stand elsewhere"
+APART = "arms that are out of each other's way (slimmer, or elsewhere)"
+TAKEN = ("payload", LINEAR_RANGE, "rules", "stands", "arms")
+LARGE = 1e6  # N; more than robots have to carry
+
+
+def _rules_filter() -> Filter:
+    """Return the filter of the rules of a free schedule: moves lead only to states that pass."""
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        for words, rules in problem.rules.loosened(problem.network.scene):
+            if not (problem.demands and words == IGNORED):  # robots hold with payloads
+                yield words, replace(problem, rules=rules)
+
+    return Filter("rules", None, loosened=loosened)
+
+
+def _standing_filter(problem: Any) -> Filter:
+    """Return the filter of the stability requirement, which may stay open for a state."""
+
+    def passes(states: StateArrays) -> Bools:
+        held = problem.held_to_stand(states.rows)
+        return np.asarray(problem.stability.stand(states.bricks, *held))
+
+    def refuses(states: StateArrays) -> Bools:
+        held = problem.held_to_stand(states.rows)
+        return np.asarray(~problem.stability.may_stand(states.bricks, *held))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        yield STANDING, replace(problem, standing=None, settled=())
+
+    return Filter("stands", passes, refuses=refuses, expensive=True, loosened=loosened)
+
+
+def _payloads_filter() -> Filter:
+    """Return the filter of payloads, by each grip."""
+
+    def passes(states: StateArrays) -> Bools:
+        over = states.forces > states.most + LIMIT_TOLERANCE * states.most
+        return np.asarray(~over.any(axis=1))
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        if recipe_of(problem.engine):
+            yield PAYLOADS, problem.carrying(LARGE)
+
+    return Filter("payload", passes, loosened=loosened)
+
+
+def _arms_filter() -> Filter:
+    """Return the filter of compatible postures: moves lead only to states that pass."""
+
+    def loosened(problem: Any) -> Iterator[tuple[str, Any]]:
+        scene = problem.network.scene  # robots without arms hold as those whose joints are rigid
+        if scene.grip_kinds.arms.any() or not recipe_of(problem.engine):
+            return
+        alone = replace(problem, scenarios=())
+        near = (
+            r if r.arm is None else replace(r, arm=replace(r.arm, keeps_apart=False))
+            for r in scene.robots
+        )
+        yield APART, alone.in_scene(scene.with_robots(*near))
+        yield ARMS, alone.in_scene(scene.with_robots(*(replace(r, arm=None) for r in scene.robots)))
+
+    return Filter("arms", None, loosened=loosened)
+
+
+def filters_of(problem: Any) -> tuple[Filter, ...]:
+    """Return all that states of a problem must pass, in the order in which each is loosened."""
+    out = [_rules_filter()]
+    out += [_standing_filter(problem)] if problem.demands else []
+    out += [_payloads_filter()]
+    out += [_arms_filter()] if problem.network.scene.has_arms else []
+    return (*out, *map(_limit_filter, problem.limits), *problem.filters)
+
+
+Asked: TypeAlias = Limit | Filter | Resource
+
+
+def parse_limits(
+    given: Sequence[str | Asked] | str | Asked, scene: Scene, where: str = "limit"
+) -> tuple[Asked, ...]:
+    """Return limits, filters and resources that are given as such, or in words.
+
+    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
+    ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
+    ``where``: for messages.
+    """
+    several = (given,) if isinstance(given, str | Asked) else given
+    if not isinstance(several, Sequence):
+        return as_limits(several)
+    out: list[Asked] = []
+    for each in several:
+        if isinstance(each, Filter | Resource):
+            out.append(each)
+        elif not isinstance(each, str):
+            out += as_limits([each])
+        elif each == "payload":
+            out += payload_limits(scene)
+        elif "=" not in each and each in (own := registered(Filter) | registered(Resource)):
+            out.append(own[each])
+        else:
+            out.append(_limit_of(each, where))
+    return tuple(out)
+
+
+def _limit_of(text: str, where: str) -> Limit:
+    """Return a limit from ``NAME=VALUE``."""
+    (name, value), said = split_word(text), f"{where} {text}"
+    if name == "payload":
+        raise ProblemError(f"{said}: give payload alone, and values with --payload")
+    if name == LINEAR_RANGE and value == LIFTED:
+        return Limit(name, math.inf)
+    if name == LINEAR_RANGE:
+        try:
+            return Limit(name, number_word(value, said))
+        except ProblemError as error:
+            hint = f"give a share of it, as 0.5, or {LIFTED} to lift it"
+            raise ProblemError(f"{error}; {hint}") from None
+    if name not in (*NAMES, "F_each") and not name.startswith("F_"):
+        names = ("payload", *NAMES, LINEAR_RANGE)
+        hint = did_you_mean(name, names)
+        raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
+    return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
+
+
+def register(*parts: Amount | Filter | Resource | Part) -> None:
+    """Add amounts, filters, resources, formats and commands, asked for by name.
+
+    Packages register theirs by entry points of the group ``seqopt.parts``.
+
+    Parameters
+    ----------
+    *parts : Amount, Filter, Resource, Format or Command
+        Each takes the place of one of its kind that was registered by its name before.
+
+    Raises
+    ------
+    ProblemError
+        If something is none of these, or has the name of something that is always there.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.problem import Amount
+    >>> seqopt.register(Amount("held", lambda states: (states.nodes >= 0).sum(axis=1)))
+    >>> seqopt.optimize("chain:bricks=7", "free", aim="minmax,held").objective["held"]
+    26.0
+    """
+    for part in parts:
+        if not isinstance(part, Amount | Filter | Resource | Part):
+            raise ProblemError(
+                f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
+                "Format of seqopt.exchange or a Command of seqopt.doors"
+            )
+        taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
+        if part.name in taken:
+            raise ProblemError(f"{part!r}: this name has a meaning already; give another one")
+        ADDED[type(part), part.name] = part
 
 
 def number_word(text: str, where: str, *, zero: bool = False) -> float:

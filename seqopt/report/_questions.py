@@ -12,7 +12,7 @@ from seqopt.engines.registry import engine_mortar, find_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.requirements import Criterion
+from seqopt.problem.criteria import Criterion
 from seqopt.questions import Built, find_build
 from seqopt.report._pages import folder_page, plan_page
 from seqopt.report._regret._measure import check_reference

@@ -19,9 +19,9 @@ from seqopt.graph.formulation import Formulation, FormulationKind, find_formulat
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import on_the_way, solve
-from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
+from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
-from seqopt.problem.requirements import Criterion, _prop_faults, overloads
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report._regret._measure import measure_regret
 from seqopt.report._regret._table import RegretTable
 from seqopt.responses._grip_sets import Resources

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.problem.requirements import _prop_faults, _response_along, overloads
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.responses.quantities import _plain, length_text, robot_response
+from seqopt.responses.scales import _response_along
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
 from seqopt.stability.assessment import Verdict

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pickle
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, KnownRows
 from seqopt.engines.interface import Engine, Want, linear_limit
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -172,52 +172,6 @@ def unpacked(engine: Engine | bytes) -> Engine:
         if len(made) > 2:
             del made[next(iter(made))]
     return made[engine]
-
-
-class KnownRows:
-    """Cached rows of values by a key and a code.
-
-    ``count``: the number computed; ``nbytes``: what they and their codes take, bytes.
-
-    >>> rows = KnownRows()
-    >>> codes = np.array([3, 1, 3])
-    >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
-    array([9., 1., 9.])
-    >>> rows.count, rows.nbytes
-    (2, 32)
-    """
-
-    def __init__(self) -> None:
-        self._known: dict[object, tuple[Ints, Floats]] = {}
-        self.count = self.nbytes = 0
-
-    def known(self, key: object, codes: Ints) -> Floats:
-        """Return the first values (n,) of cached rows; NaN of others."""
-        known, values = self._known.get(key, (codes[:0], None))
-        if values is None or not len(known):
-            return np.full(len(codes), np.nan)
-        at = np.searchsorted(known, codes).clip(max=len(known) - 1)
-        return np.where(known[at] == codes, values[at, 0], np.nan)
-
-    def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
-        """Return the rows (n, k) of codes (n,); those not cached are computed as one batch.
-
-        ``key``: codes of other keys are others; ``compute``: returns the rows of distinct codes,
-        given the places of their first occurrence in the request.
-        """
-        distinct, first = np.unique(codes, return_index=True)
-        known, values = self._known.get(key, (distinct[:0], None))
-        fresh = first[~np.isin(distinct, known, assume_unique=True)]
-        if values is None or len(fresh):
-            computed = compute(fresh)
-            known = np.concatenate([known, codes[fresh]])
-            values = computed if values is None else np.concatenate([values, computed])
-            order = np.argsort(known, kind="stable")
-            known, values = known[order], values[order]
-            self._known[key] = known, values
-            self.count += len(fresh)
-            self.nbytes += codes[fresh].nbytes + computed.nbytes
-        return np.asarray(values[np.searchsorted(known, codes)])
 
 
 class GripSets:

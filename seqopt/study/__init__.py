@@ -32,12 +32,13 @@ from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
+    Criterion,
     RankSum,
     WeightedSum,
     WorstRatio,
     equal,
 )
-from seqopt.problem.requirements import CHOICE_RESPONSES, NAMES, Criterion, number_word, split_word
+from seqopt.problem.requirements import CHOICE_RESPONSES, NAMES, number_word, split_word
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns
 from seqopt.scene.parts import Anywhere, Robot, Side

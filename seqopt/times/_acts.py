@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
+from seqopt.graph.graph import Graph
+from seqopt.graph.instance import HELD, NOW, TimedGraph
 from seqopt.times._fall_cuts import CuringStates
 
 Groups = tuple[tuple[int, ...], ...]

@@ -8,8 +8,8 @@ from pathlib import Path
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import ProblemError, StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.problem.standing import Standing
 from seqopt.questions import Built, Steps, find_build
+from seqopt.stability.standing import Standing
 from seqopt.times._step_check import check_cured
 from seqopt.work.progress import Tell
 

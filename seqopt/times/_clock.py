@@ -10,15 +10,14 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
-from seqopt.graph.graph import Graph, TimedGraph
-from seqopt.graph.instance import TIME, Instance, _Target
-from seqopt.graph.paths import _to_go
+from seqopt.graph.graph import Graph, _to_go
+from seqopt.graph.instance import TIME, Instance, TimedGraph, _Target
 from seqopt.judge._bounds import Book, Closed, is_beyond_limits, limit_below
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
 from seqopt.judge.arithmetic import Claim, Stage, _sum, sum_books
 from seqopt.network.network import Network
-from seqopt.problem.standing import Standing
+from seqopt.stability.standing import Standing
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
 from seqopt.times._curing import JointsInTime
 from seqopt.times._fall_cuts import CuringStates, FallCuts

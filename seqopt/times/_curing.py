@@ -15,10 +15,10 @@ from seqopt.contact.faces import PartialAssemblies, _contact_at
 from seqopt.contact.mortar import Curing, Mortar
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.stability._steps import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of
+from seqopt.stability.standing import Standing
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there
 

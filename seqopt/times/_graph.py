@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph._explore import Visited
-from seqopt.graph.graph import HELD, NOW, Graph, TimedGraph
-from seqopt.graph.states.states import States
+from seqopt.graph.graph import Graph
+from seqopt.graph.instance import HELD, NOW, TimedGraph
+from seqopt.graph.space import Visited
+from seqopt.graph.states import States
 from seqopt.times._fall_cuts import CuringStates, FallCuts
 from seqopt.times._steps import require_durations
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SolverError
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.judge._bounds import BETTER
 from seqopt.network.network import Network
-from seqopt.problem.standing import Standing
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability.assessment import Verdict, verdict
+from seqopt.stability.standing import Standing
 
 CLOSE = 1e-9  # of a time: what rounding may take from an age
 

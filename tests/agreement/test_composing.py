@@ -14,9 +14,9 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
+from seqopt.graph._candidates import walk
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
-from seqopt.graph.states.states import build_states
-from seqopt.graph.states.walk import walk
+from seqopt.graph.states import build_states
 from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import RankSum

@@ -12,7 +12,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
-from seqopt.graph._orders import order_rules
+from seqopt.graph._spaces import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status

@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.harness.layers import Budget, LayeredCosts
 from formulations import rank_search
-from formulations.choice import Choice
 from formulations.flow import OVERLAP_MIP
-from formulations.on_graph import on_graph
+from formulations.on_graph import Choice, on_graph
 from formulations.solvers import minimize_by_highs
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import (

@@ -26,13 +26,13 @@ from formulations.contact.limit_analysis import (
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.standing import NARROW, Standing, _without_implied, slack
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case, Claim, Prover, Sense, limits
+from seqopt.stability.standing import NARROW, Standing, _without_implied, slack
 from tests.brute_force import ONES as FOUR_ONES
 from tests.brute_force import allowed, least_peak, peaks, whole_graph
 from tests.builders import held, small_arch

@@ -12,16 +12,14 @@ import pytest
 from hypothesis import example, given, settings
 
 import seqopt
-from formulations.choice import Choice
-from formulations.on_graph import on_graph
-from formulations.states._search import ThresholdSearch, path_values
+from formulations._search import ThresholdSearch
+from formulations.on_graph import Choice, on_graph
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
+from seqopt.graph.graph import _on_paths, fewest_moves, path_values
 from seqopt.graph.instance import Instance, _Cap, _Target
-from seqopt.graph.paths import _on_paths, fewest_moves
-from seqopt.graph.space import Moves, Space
-from seqopt.graph.states.states import build_states
+from seqopt.graph.space import Explorer, Moves, Space
+from seqopt.graph.states import build_states
 from seqopt.problem.problem import Aim
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability.assessment import Verdict

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 
 import seqopt
 from experiments.harness.scenes import longer
-from formulations.states._search import exact_best, narrow
+from formulations._search import exact_best, narrow
 from seqopt.errors import (
     InfeasibleError,
     NothingFoundError,
@@ -26,11 +26,10 @@ from seqopt.errors import (
     StepError,
     TimeUpError,
 )
-from seqopt.graph._explore import Explorer
+from seqopt.graph._spaces import StateSpace, explore
 from seqopt.graph.formulation import FormulationKind, find_formulation
-from seqopt.graph.states._visits import StateSpace
-from seqopt.graph.states.explored import explore
-from seqopt.graph.states.states import build_states, within
+from seqopt.graph.space import Explorer
+from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.front import FrontProblem, find_front

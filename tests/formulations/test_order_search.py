@@ -12,20 +12,20 @@ import pytest
 from hypothesis import given, settings
 
 import seqopt
-from formulations.states.order_search import FORMULATION
+from formulations.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph._orders import among_orders, order_rules
+from seqopt.graph._spaces import among_orders, order_rules
 from seqopt.graph.formulation import FormulationKind, find_formulation
-from seqopt.graph.states.states import build_states, over_scenarios, within
+from seqopt.graph.states import build_states, over_scenarios, within
 from seqopt.judge._proof import Proof
 from seqopt.plan.plan import Status
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
-from seqopt.problem.standing import Standing, slack
 from seqopt.responses import Resources
 from seqopt.sequence.rules import FreeRules
+from seqopt.stability.standing import Standing, slack
 from seqopt.work.progress import Stage
 from tests.builders import small_arch
 from tests.strategies import free_builds

@@ -10,9 +10,8 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError
-from seqopt.graph.formulation import find_formulation
-from seqopt.graph.graph import LabelProof
-from seqopt.graph.states.explored import explore
+from seqopt.graph._spaces import explore
+from seqopt.graph.formulation import LabelProof, find_formulation
 from seqopt.plan.pose import graph_of
 from seqopt.problem import Resource
 from seqopt.sequence.rules import FreeRules

@@ -15,7 +15,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.graph.states.states import build_states, within
+from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.quantities import CHOSEN_BY

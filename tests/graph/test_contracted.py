@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from seqopt.graph import Graph, lexicographic
-from seqopt.graph.paths import _on_paths, contracted, keep_best, path_values
+from seqopt.graph.graph import _on_paths, contracted, keep_best, path_values
 from tests.random_graphs import graphs, simple_paths, values_of
 
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from experiments.harness.layers import Budget, LayeredCosts
-from formulations.states._search import exact_best
+from formulations._search import exact_best
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, is_beyond, within_budgets
-from seqopt.graph.paths import _sum_bound, distances, lexicographic_bounds, reached
+from seqopt.graph.graph import _sum_bound, distances, lexicographic_bounds, reached
 from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
 from tests.layered import Costs

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.harness.layers import best_in_order
-from formulations.states._search import _Totals
+from formulations.on_graph import _Totals
 from seqopt.graph import Graph
-from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, widening
+from seqopt.graph._candidates import _branches
+from seqopt.graph._labels import CappedSums, Joint, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
-from seqopt.graph.paths import FAILS, PASSES, _lazy_path
-from seqopt.graph.states.walk import _branches
+from seqopt.graph.graph import FAILS, PASSES, _lazy_path
 from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import Ranked, _ranks_of
@@ -39,9 +39,10 @@ def test_the_cheapest_path_within_two_caps_is_found(graph, caps):
     paths = taken(graph).reshape(-1, 3)
     least = paths[(paths[:, 1:] <= caps).all(axis=1), 0].min(initial=np.inf)
     for multipliers in (np.zeros(2), np.array([0.5, 2.0])):  # they lead, and change nothing
-        growth = CappedSums(
+        sums = CappedSums(
             graph, graph.amounts[:, 0], graph.amounts[:, 1:], np.array(caps), multipliers
         )
+        growth = Joint(graph, [sums])
         found = widening(growth, np.array(caps), NONE, Watch(), 10_000)
         assert (found.cost, found.bound) == pytest.approx((least, least))
         if np.isfinite(least):
@@ -54,7 +55,7 @@ def test_the_cheapest_path_within_two_caps_is_found(graph, caps):
 @few
 def test_the_least_total_over_scenarios_is_found(graph, aim):
     least = min((aim.value(totals) for totals in taken(graph)), default=np.inf)
-    growth = _Totals(graph, aim, np.full(3, 1 / 3))
+    growth = Joint(graph, [_Totals(graph, aim, np.full(3, 1 / 3))])
     found = widening(growth, np.zeros(0), NONE, Watch(), 10_000)
     assert (found.cost, found.bound) == pytest.approx((least, least))
     one = widening(growth, np.zeros(0), NONE, Watch(), 1)
@@ -64,9 +65,10 @@ def test_the_least_total_over_scenarios_is_found(graph, aim):
 @given(graph=graphs(goals=2))
 @few
 def test_a_sweep_stops_in_time_and_at_so_many_labels(graph):
-    growth = CappedSums(
+    sums = CappedSums(
         graph, graph.amounts[:, 0], graph.amounts[:, 1:], np.array([9.0]), np.zeros(1)
     )
+    growth = Joint(graph, [sums])
     limits = np.array([np.inf, 9.0])
     with pytest.raises(LateError):
         Sweep(growth, limits).run(Watch(0.0))

@@ -17,12 +17,17 @@ from experiments.harness.layers import Budget, LayeredCosts
 from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph import Explorer
-from seqopt.graph._orders import OrderSpace, among_orders
+from seqopt.graph._spaces import OrderSpace, among_orders, explore, floors_of_goals
 from seqopt.graph.formulation import End, FormulationKind, formulations
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, keep_best, least_peak, lexicographic_bounds, reached
-from seqopt.graph.states.explored import explore, floors_of_goals
-from seqopt.graph.states.states import build_states
+from seqopt.graph.graph import (
+    Graph,
+    distances,
+    keep_best,
+    least_peak,
+    lexicographic_bounds,
+    reached,
+)
+from seqopt.graph.states import build_states
 from seqopt.judge import _bounds as budget_proof
 from seqopt.judge._bounds import least_within
 from seqopt.judge._proof import Proof, TooManyPartsError

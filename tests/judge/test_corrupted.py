@@ -14,10 +14,10 @@ import pytest
 
 import seqopt
 from formulations.times._labels import InTime
-from seqopt.graph.states._candidates import CandidateCosts
-from seqopt.graph.states.explored import bisected
-from seqopt.graph.states.states import States
-from seqopt.problem import Amount, Filter, filters
+from seqopt.graph._candidates import CandidateCosts
+from seqopt.graph._spaces import bisected
+from seqopt.graph.states import States
+from seqopt.problem import Amount, Filter, requirements
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
 from seqopt.sequence._space import FreeSpace, ScheduleSpace
 from tests.brute_force import ONES
@@ -129,7 +129,7 @@ def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monke
     def wrong(name, exists):
         return tuple(value + shift for value in bisected(name, exists))
 
-    monkeypatch.setattr("seqopt.graph.states.explored.bisected", wrong)
+    monkeypatch.setattr("seqopt.graph._spaces.bisected", wrong)
     assert is_refused(posed(space, amount))
 
 
@@ -244,8 +244,8 @@ def corrupt(monkeypatch, problem, kind, change):
         return replace(problem, filters=tuple(map(of_filter, problem.filters)))
     if kind in ("limit", "payload"):
         name = f"_{kind}s_filter" if kind == "payload" else f"_{kind}_filter"
-        own = getattr(filters, name)
-        monkeypatch.setattr(filters, name, lambda *of: of_filter(own(*of)))
+        own = getattr(requirements, name)
+        monkeypatch.setattr(requirements, name, lambda *of: of_filter(own(*of)))
     elif kind == "stands":
         of_method(States, "stand", lambda self, level: self.space.bricks_at(level))
         monkeypatch.setattr(States, "recalled", lambda self, level, states: np.zeros(len(states)))

@@ -11,10 +11,9 @@ import pytest
 import seqopt
 from seqopt._registry import ADDED
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.graph.formulation import find_formulation
-from seqopt.graph.graph import Graph, LabelProof
-from seqopt.graph.paths import lexicographic
-from seqopt.graph.states.states import build_states
+from seqopt.graph.formulation import LabelProof, find_formulation
+from seqopt.graph.graph import Graph, lexicographic
+from seqopt.graph.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem import Amount

@@ -14,7 +14,7 @@ from experiments.harness.layers import Budget, LayeredCosts
 from seqopt import judge_instance
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import FormulationKind, find_formulation
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.judge._rule_moves import RuleTables
 from seqopt.judge.certificate import TOLERANCE

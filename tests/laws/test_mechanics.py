@@ -18,7 +18,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.instances.compiled import compile_instance
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WorstRatio

@@ -11,16 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from formulations.states.order_search import FORMULATION as ORDER
-from formulations.states.pareto_zones import FORMULATION as FRONT
-from formulations.states.schedule_search import FORMULATION as PLAN
+from formulations.order_search import FORMULATION as ORDER
+from formulations.pareto_zones import FORMULATION as FRONT
+from formulations.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph import Explorer
-from seqopt.graph._orders import among_orders
+from seqopt.graph._spaces import StateSpace, among_orders, barred, explore
 from seqopt.graph.formulation import Solution
-from seqopt.graph.states._visits import StateSpace
-from seqopt.graph.states.explored import barred, explore
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.plan.solve import solve

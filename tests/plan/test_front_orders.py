@@ -13,9 +13,9 @@ from experiments.harness.layers import Budget, LayeredCosts
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.engines.registry import make_engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._orders import TooManySetsError, order_rules
+from seqopt.graph._spaces import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.paths import TIED
+from seqopt.graph.graph import TIED
 from seqopt.network.build import build_network
 from seqopt.plan import front as fronts
 from seqopt.plan.front import find_front
@@ -175,7 +175,7 @@ def test_what_does_not_fit_is_one_line(monkeypatch):
     with pytest.raises(ProblemError, match="do not fit the memory; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
     monkeypatch.setattr(fronts, "free_memory", lambda: np.inf)
-    monkeypatch.setattr("seqopt.graph.states.explored.MOST_PARTS", 3)
+    monkeypatch.setattr("seqopt.graph._spaces.MOST_PARTS", 3)
     with pytest.raises(TooManySetsError, match="more than 3 sets of bricks; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
 

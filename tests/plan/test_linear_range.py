@@ -21,8 +21,7 @@ from seqopt.plan.plan import Status
 from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import INTERRUPTED, NONE_KEEPS, UNKNOWN, best_within
 from seqopt.problem.criteria import WeightedSum, WorstRatio
-from seqopt.problem.filters import parse_limits
-from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
+from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits, parse_limits
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene

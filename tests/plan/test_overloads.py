@@ -13,7 +13,7 @@ from experiments.harness.layers import LayeredCosts
 from seqopt import Search
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.plan._infeasible import payload_advice
 from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import solve

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.layers import LayeredCosts, compile_costs, compile_totals, largest_of
+from formulations.on_graph import by_weights, cheapest_by, least_total
 from formulations.path_dp import SCENARIO_SEARCH
 from formulations.scenario_program import solve_program
-from formulations.states._search import by_weights, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation

@@ -19,6 +19,7 @@ from seqopt.problem import Amount, Filter
 from seqopt.problem.amounts import BUILT_IN, find_amount
 from seqopt.problem.criteria import (
     OVER_METHODS,
+    ROUNDED,
     WORST_OVER_METHODS,
     RankSum,
     WeightedSum,
@@ -27,7 +28,8 @@ from seqopt.problem.criteria import (
 )
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.problem import parse_budgets
-from seqopt.problem.requirements import NEVER, ROUNDED, Limit, Units
+from seqopt.problem.requirements import Limit
+from seqopt.responses.scales import NEVER, Units
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch

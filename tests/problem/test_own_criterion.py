@@ -14,11 +14,11 @@ import seqopt
 from experiments.harness.layers import best_in_order
 from experiments.harness.scenes import running_bond
 from seqopt.errors import InfeasibleError, ProblemError, StepError
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.problem.criteria import OVER_METHODS, RankSum, StepCost, WeightedSum, equal
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import NEVER, SceneFacts, crown
+from seqopt.responses.scales import NEVER, SceneFacts, crown
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION

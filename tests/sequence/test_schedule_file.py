@@ -12,8 +12,8 @@ import pytest
 import seqopt
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.errors import FileError, ProblemError, SolverError, StepError
-from seqopt.graph._orders import among_orders
-from seqopt.graph.states.states import build_states
+from seqopt.graph._spaces import among_orders
+from seqopt.graph.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.build import build_network

@@ -20,7 +20,8 @@ from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
 from seqopt.stability.limit_analysis import Prover
-from tests.documents import box, obj
+from tests.blocks import box
+from tests.documents import obj
 
 FRICTIONS = (0.15, 0.45)
 

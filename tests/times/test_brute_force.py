@@ -11,13 +11,12 @@ import pytest
 import seqopt
 from formulations.times._search import plan_in_time
 from seqopt.errors import ProblemError, SceneError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation
-from seqopt.graph.graph import LabelProof
+from seqopt.graph.formulation import Formulation, FormulationKind, LabelProof, find_formulation
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
-from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import Site
+from seqopt.stability.standing import Standing
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES

@@ -15,9 +15,9 @@ from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
-from seqopt.problem.standing import Standing
 from seqopt.scene import Durations
 from seqopt.sequence.rules import FreeRules
+from seqopt.stability.standing import Standing
 from seqopt.times._curing import CuringBuilds, JointsInTime
 from seqopt.times._step_check import check_cured, step_ends
 from seqopt.times._steps import step_times

@@ -32,9 +32,9 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, formulations
 from seqopt.plan.pose import pose
-from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.criteria import Criterion, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study import EQUATIONS, RESOLUTION
 from tests.layered import Costs, of_layers

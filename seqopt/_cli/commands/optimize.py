@@ -19,8 +19,9 @@ from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import OWN, overloads
+from seqopt.problem.requirements import overloads
 from seqopt.responses._tolerance import values_text
+from seqopt.responses.scales import OWN
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts, find_prover

@@ -39,9 +39,8 @@ from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import graph_of, pose
 from seqopt.plan.solve import on_the_way, solve
-from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum
+from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import Criterion
 from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import FREE, FreeRules

@@ -11,12 +11,12 @@ import numpy as np
 
 from seqopt._registry import Later, Shown
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
+from seqopt.graph._candidates import CandidateCosts
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.graph.states._candidates import CandidateCosts
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.amounts import (
@@ -28,8 +28,7 @@ from seqopt.problem.amounts import (
     StateArrays,
     judged_by,
 )
-from seqopt.problem.criteria import RankSum, _counts_every_step
-from seqopt.problem.filters import Filter, filters_of
+from seqopt.problem.criteria import Criterion, RankSum, _counts_every_step, state_costs
 from seqopt.problem.problem import (
     WORST_PEAK,
     Aim,
@@ -41,9 +40,7 @@ from seqopt.problem.problem import (
     of_states,
     robot_responses,
 )
-from seqopt.problem.requirements import Criterion, Limit, state_costs
-from seqopt.problem.resources import Resource
-from seqopt.problem.standing import Standing, StandingSets
+from seqopt.problem.requirements import Filter, Limit, Resource, filters_of
 from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.scene._checks import as_float, short
@@ -52,6 +49,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
+from seqopt.stability.standing import Standing, StandingSets, as_standing
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
@@ -64,21 +62,18 @@ COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stab
 class States(Shown):
     """The states of a build and the moves between them; everything is computed when first needed.
 
-    ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
-    allow, or those that choose the open grips of a schedule, however many are open in a step;
-    ``criterion``: what a step costs, for the goals that name no response; ``goals``: what to
-    minimize, the most important first; ``limits``: bounds of all steps; ``standing``: stability
-    requirement of all states, if any; ``settled``: margins that are required as well; ``budgets``:
-    caps on the sums of as many last goals, which are constraints, not objectives; ``scenarios``:
-    engines of the same scene in other states of the world: the largest value over them counts, and
-    limits and stability hold in all; by default that of ``engine`` alone. ``over``: aggregation of
-    their totals, if the goal is a sum; ``weights``: of the scenarios in it, in place of the
-    largest. ``resources``: workers of grip sets, which the proof does
-    not use; ``filters``: further requirements of states; ``orders``: which orders of the bricks are
-    searched, by default the scene's own alone: values keep its scales; ``paths``: resources that
-    plans must keep; ``answers``: responses of grip sets that were computed, by engine and names,
-    shared by all problems that are derived from one; ``judged``: what the judge computed again of
-    all choices of a level, which no formulation is given.
+    ``rules``: which moves are possible: those that rules allow, or those that choose the open grips
+    of a schedule, however many are open in a step; ``criterion``: for the goals that name no
+    response; ``goals``: what to minimize, the most important first; ``standing``: stability
+    requirement of all states; ``settled``: margins that are required as well; ``budgets``: caps on
+    the sums of as many last goals, which are constraints, not objectives; ``scenarios``: engines of
+    the same scene in other states of the world: the largest value over them counts, and limits and
+    stability hold in all; ``over``: aggregation of their totals, if the goal is a sum; ``weights``:
+    of the scenarios in it, in place of the largest; ``resources``: workers of grip sets, which the
+    proof does not use; ``orders``: which orders of the bricks are searched, by default the scene's
+    own alone: values keep its scales; ``paths``: resources that plans must keep; ``answers``:
+    responses of grip sets that were computed, by engine and names, shared by all problems that are
+    derived from one; ``judged``: what the judge computed again, which no formulation is given.
     """
 
     engine: Engine
@@ -100,17 +95,13 @@ class States(Shown):
     judged: dict[object, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
+        parts = [repr(self.network.scene.name)]
+        parts += [repr(self.method)] if self.method != FREE else []
+        parts += [f"{len(self.scenarios)} scenarios"] if self.scenarios else []
+        parts += [f"{self.orders.value} orders"] if self.orders is not None else []
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
-        capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
-        goals = ", ".join([*self.names[: len(self.aims)], *capped])
-        where = f"{self.network.scene.name!r}"
-        if self.rules.method != FREE:
-            where += f", {self.rules.method!r}"
-        if self.scenarios:
-            where += f", {len(self.scenarios)} scenarios"
-        if self.orders is not None:
-            where += f", {self.orders.value} orders"
-        return f"States({where}, {goals}, {len(self.limits)} limits)"
+        parts += [*self.names[: len(self.aims)], *(f"{goal} <= {cap:g}" for goal, cap in caps)]
+        return f"States({', '.join(parts)}, {len(self.limits)} limits)"
 
     @cached_property
     def each(self) -> tuple[States, ...]:
@@ -242,24 +233,17 @@ class States(Shown):
         """Return the node chosen for every move; a `ProblemError` where rules have none."""
         return self.rules.chosen(steps)
 
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of the table of responses: whose grips were open."""
-        return self.rules.step_columns(steps)
-
-    def letting_go(self, steps: Sequence[Step]) -> int:
-        """Return how many steps at the end only let go."""
-        return self.rules.letting_go(self.network.scene, steps)
-
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
         from seqopt.sequence._space import ScheduleSpace, free_space  # noqa: PLC0415  # candidates need none
 
-        network, rules, caps, worlds = self.network, self.rules, self.caps, self.worlds
+        network, rules, caps, parks = self.network, self.rules, self.caps, self.parks
         if isinstance(rules, Schedule):  # its robots are never alike
-            return ScheduleSpace(network, rules, caps, self.parks, worlds)
-        how = {"parks": self.parks, "timed": self.is_timed}
-        return free_space(network, rules, caps, **how, worlds=worlds)
+            return ScheduleSpace(network, rules, caps, parks, self.worlds)
+        return free_space(
+            network, rules, caps, parks=parks, timed=self.is_timed, worlds=self.worlds
+        )
 
     @property
     def worlds(self) -> tuple[Scene, ...]:
@@ -280,12 +264,8 @@ class States(Shown):
     def caps(self) -> Mapping[str, float]:
         """Limits on single robots, by name, N."""
         own = {robot_response(robot.name): robot.name for robot in self.network.scene.robots}
-        out: dict[str, float] = {}
-        for limit in self.limits:
-            if limit.response in own:
-                name = own[limit.response]
-                out[name] = min(limit.bound, out.get(name, np.inf))
-        return out
+        caps = [(own[e.response], e.bound) for e in self.limits if e.response in own]
+        return {name: min(cap for other, cap in caps if other == name) for name, _ in caps}
 
     @cached_property
     def asked(self) -> frozenset[str]:
@@ -301,11 +281,6 @@ class States(Shown):
     def named(self) -> tuple[str, ...]:
         """Those of a state, independent of which robot holds where."""
         return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS) if name in self.asked)
-
-    @cached_property
-    def _of_each(self) -> frozenset[str]:
-        """Those that belong to single robots."""
-        return self.asked - {*self.named}
 
     @property
     def by_robot(self) -> bool:
@@ -369,8 +344,8 @@ class States(Shown):
     ) -> tuple[StateArrays, Bools]:
         """Return states as amounts and filters see them, and which pass the filters.
 
-        ``states`` (n, c): as in `seqopt.sequence._space`; ``rough``: whether single precision
-        is enough, except close to a limit. Stability is evaluated later.
+        ``states`` (n, c): as of the space; ``rough``: whether single precision is enough, except
+        close to a limit. Stability is evaluated later.
         """
         seen = self.seen(level, states, rough=rough)
         fits = seen.possible.copy()
@@ -385,7 +360,8 @@ class States(Shown):
 
     def seen(self, level: int, states: Ints, *, rough: bool = False) -> StateArrays:
         """Return states as amounts and filters see them, before any filter is asked."""
-        (held, most), bricks = self._grips(states), self.space.bricks_at(level)
+        held, most = _ascending(self._columns(states), self._caps)
+        bricks = self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
         if rough and self.screened is not self.sets:
             close = self._close(bricks, self._by_name(level, states, answers, forces), forces, most)
@@ -404,8 +380,7 @@ class States(Shown):
         held, own = self._columns(states), np.full(forces.shape, np.nan)
         np.put_along_axis(own, np.argsort(held, axis=1, kind="stable"), forces, axis=1)
         own[held == 0] = np.nan
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        names = [robot_response(self.network.scene.robots[robot].name) for robot in robots]
+        names = [robot_response(self.network.scene.robots[robot].name) for robot in self.robots]
         columns = self.space.open_columns(level)
         moving = own[:, columns[-1]] if columns else np.full(len(states), np.nan)
         return {**dict(zip(names, own.T, strict=True)), "F_move": moving}
@@ -451,7 +426,9 @@ class States(Shown):
         """Return the responses of states (n,) by name."""
         found = dict(zip(self.sets.names, answers.T, strict=True))
         found[LARGEST] = forces.max(axis=1, initial=0.0)
-        return found | (self._of_robots(level, states, forces) if self._of_each else {})
+        return found | (
+            self._of_robots(level, states, forces) if self.asked - {*self.named} else {}
+        )  # those of single robots
 
     def _close(
         self, bricks: int, found: Mapping[str, Floats], forces: Floats, most: Floats
@@ -576,6 +553,11 @@ class States(Shown):
         """Cached verdicts of the cone program, by brick count and grips."""
         return {}
 
+    @property
+    def robots(self) -> list[int]:
+        """The robot of every column of a state; those that are alike have any of theirs."""
+        return [robot for kind in self.space.kinds for robot in kind.robots]
+
     @cached_property
     def _caps(self) -> Floats:
         """The largest force of the robot of every column of a state, N."""
@@ -586,21 +568,15 @@ class States(Shown):
     def _beyond(self) -> Ints:
         """Offset of the places of grips from those of nodes, of the robot of every column, (r,)."""
         of_robot = self.network.scene.grip_kinds.of_robot
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        return np.asarray(2 * len(self.network.inner) * of_robot[robots])
+        return np.asarray(2 * len(self.network.inner) * of_robot[self.robots])
 
     @cached_property
     def _payloads(self) -> Floats:
         """What the robot of every column may carry where states must stand, N."""
         if not self.rules.keeps_payloads(stands=True):
             return self._caps
-        robots = [robot for kind in self.space.kinds for robot in kind.robots]
-        payloads = np.array([self.network.scene.robots[robot].payload for robot in robots])
+        payloads = np.array([self.network.scene.robots[robot].payload for robot in self.robots])
         return np.asarray(np.minimum(payloads, self._caps))
-
-    def _grips(self, states: Ints) -> tuple[Ints, Floats]:
-        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
-        return _ascending(self._columns(states), self._caps)
 
     def _columns(self, states: Ints) -> Ints:
         """Return the place of the grip of every column, (n, r), 0 for none."""
@@ -642,11 +618,10 @@ def build_states(
 ) -> States:
     """Return the problem of the free schedule of an engine's scene.
 
-    ``rules``: what they allow, or the open grips of a schedule, however many are open in a step;
-    where its states must stand, robots keep their payloads. ``goals``: see `parse_goals`.
-    ``stands``: that every state does, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is
-    computed yet, except scales that a criterion takes from the scene. Raises `ProblemError` if
-    goals, criterion or limits use a response that a state does not have, or ranks among choices.
+    ``goals``: see `parse_goals`; ``stands``: that every state does, robots within payload, with
+    this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is computed yet, except scales that a
+    criterion takes from the scene. Raises `ProblemError` if goals, criterion or limits use a
+    response that a state does not have, or ranks among choices.
 
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
@@ -658,16 +633,14 @@ def build_states(
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)
-    standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(States(engine, rules, criterion, named, limits, standing))
+    return _asked(States(engine, rules, criterion, named, limits, as_standing(stands)))
 
 
 def within(problem: States, caps: Mapping[Amount | str, float]) -> States:
     """Return a problem whose plans keep totals over the build within caps.
 
-    ``caps``: amounts or their names, as ``steps``, ``regrips``, ``travel`` (m) or
-    ``sum(RESPONSE)``, and how much each may be. Raises `ProblemError` if something is no total, or
-    a cap is no number from 0.
+    ``caps``: amounts or their names, and how much each may be. Raises `ProblemError` if something
+    is no total, or a cap is no number from 0.
 
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
@@ -695,9 +668,8 @@ def over_scenarios(
 ) -> States:
     """Return a problem whose worst values count in any of some scenarios, or totals over them.
 
-    Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
-    was posed for. A `ProblemError` names a goal that is no worst value, or not the one sum of which
-    totals are made.
+    The criterion keeps the numbers of the scene that it was posed for. A `ProblemError` names a
+    goal that is no worst value, or not the one sum of which totals are made.
     """
     sums = [goal for goal in problem.goals if goal.states and not goal.is_peak]
     if over.aim is Aim.SUM and problem.goals != (*sums,)[:1]:

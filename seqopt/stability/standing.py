@@ -9,7 +9,7 @@ from operator import le
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, KnownRows
 from seqopt.contact.mortar import (
     DRY,
     Curing,
@@ -22,7 +22,6 @@ from seqopt.contact.mortar import (
 )
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
-from seqopt.responses._grip_sets import KnownRows
 from seqopt.scene._checks import settle, short
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Proofs, Screen
 
@@ -98,6 +97,11 @@ class Standing:
             "tilt_deg": degrees(self.tilt),
             **({} if self.curing is None else {"curing": str(self.curing)}),
         }
+
+
+def as_standing(given: Standing | Mortar | str | None) -> Standing | None:
+    """Return a requirement that is given as such, or by its mortar."""
+    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
 
 
 def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:

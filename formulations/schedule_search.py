@@ -45,14 +45,13 @@ halving an interval, and all further states must have it.
 
 from __future__ import annotations
 
-from formulations.choice import Choice, shortest
+from formulations._search import Options, Watching, after_margins, search_states
 from formulations.labels import relaxed
-from formulations.on_graph import on_graph
-from formulations.states._search import Options, Watching, after_margins, best_total, search_states
+from formulations.on_graph import Choice, best_total, on_graph, shortest
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 
 
 def choose(graph: Graph, watch: Watch, *, width: int = 50, growth: float = 1.1) -> Choice:

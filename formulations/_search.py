@@ -18,44 +18,19 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from math import comb
 from operator import itemgetter, le
-from typing import NamedTuple
 
 import numpy as np
 
-from formulations.choice import Choose
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph._budgets import (
-    Plane,
-    Polyhedron,
-    Within,
-    highest_bound,
-    is_beyond,
-    within_budgets,
-)
-from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph._labels import LabelSearch, SummedLabels, widening
+from seqopt.graph._budgets import Within, is_beyond, within_budgets
+from seqopt.graph._spaces import best_margin, build_space, floors_of_goals
 from seqopt.graph.formulation import Solution, Watch
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import (
-    Best,
-    Contracted,
-    _on_paths,
-    contracted,
-    distances,
-    lexicographic,
-    moves_along,
-    path_values,
-    reached,
-    strictly_below,
-    tied,
-)
-from seqopt.graph.space import Key, Space
-from seqopt.graph.states.explored import best_margin, build_space, explore, floors_of_goals
-from seqopt.graph.states.states import States
-from seqopt.problem.problem import RobustAim
+from seqopt.graph.graph import Best, distances, lexicographic, reached, strictly_below, tied
+from seqopt.graph.space import Explorer, Key, Space, Visited
+from seqopt.graph.states import States
 from seqopt.work._workers import free_memory
-from seqopt.work.progress import Stage, Tell, answered
+from seqopt.work.progress import Stage, Tell
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
@@ -68,82 +43,6 @@ GROWN = 1.1  # times as much is kept before it is asked again how much memory is
 
 Watching = Callable[[Explorer], None]
 Search = Callable[[States], Solution]
-
-
-def best_total(
-    problem: States, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
-) -> Solution:
-    """Return the plan of least total over scenarios, with its bound and scenario weights.
-
-    ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
-    default all, without which no plan is proven to be the least.
-    """
-    demands = bool(problem.demands)
-    space = build_space(problem, regrips=width is None, standing=demands)
-    try:
-        found = Explorer(space, width, tell)
-        if not found.rise():
-            if width is not None:
-                return best_total(problem, choose, watch, tell)
-            raise found.without_plan("no plan is allowed")
-        visited = found.graph()
-        short = _decisions(problem, visited.graph)
-        best = least_total(short.graph, problem.over, cheapest_by(choose, watch), watch)
-    except StopError as stop:
-        raise _too_little(stop) from None
-    plan = selected(space, visited, Best(short.expanded(best.path), (best.value,)))
-    prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
-    return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
-
-
-def chosen(
-    problem: States, choose: Choose, watch: Watch, tell: Watching, *, alone: bool = False
-) -> Solution:
-    """Return the plan of a choice; where time was over, the better one of it and the incumbent.
-
-    ``alone``: whether it is charged as of `Graph.alone`, where grips are open.
-    """
-    first = None
-    try:
-        first = narrow(problem, WIDTH, tell)
-        wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
-        if not wide.whole:
-            raise wide.without_plan("no plan is allowed")
-        wide.refine()
-        graph, states = wide.graph()
-        graph = replace(graph, caps=problem.budgets)
-        if alone and problem.rules.names_robots() and problem.goals[0].of_criterion:
-            own = [problem.candidates.charges(level, rows) for level, _, rows in states]
-            graph = replace(graph, alone=np.concatenate(own)[graph.target])
-        short = _decisions(problem, graph)
-        with answered(watch.interrupt):
-            best = choose(short.graph, watch)
-    except (StopError, KeyboardInterrupt) as stop:
-        return plan_by_then(first, stop)
-    stopped = "interrupt" if watch.interrupted else "time" * best.stopped
-    if best.path:
-        path = short.expanded(best.path)
-        values = path_values(graph, path)
-        found = selected(wide.space, Visited(graph, states), Best(path, values))
-    if not best.path or (first and best.stopped and first.objective < values):
-        found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
-    known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
-    bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
-    return replace(
-        found,
-        bound=bound,
-        stopped=stopped,
-        prices=best.prices,
-        compile_seconds=best.compile_seconds,
-    )
-
-
-def _decisions(problem: States, graph: Graph) -> Contracted:
-    """Return the moves on paths to ends; where grips are open each with the forced ones behind."""
-    kept, every = graph.only(_on_paths(graph)), np.arange(graph.states)
-    if problem.rules.moves:
-        return contracted(kept)
-    return Contracted(kept, every, kept.target.astype(np.int64), every)
 
 
 def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
@@ -543,18 +442,12 @@ def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Sol
 def unproven(found: Solution, wide: Explorer, proven: float) -> Solution:
     """Return the incumbent with the bound of the first goal from thresholds and reached levels."""
     bound = proven
-    if not wide.peaks[0] and wide.level:
+    if not wide.space.peaks[0] and wide.level:
         graph, states = wide.graph()
         least = distances(graph, graph.amounts[:, 0])
         level = np.repeat([level for level, *_ in states], [len(rows) for *_, rows in states])
         bound = float(least[level == wide.level].min(initial=np.inf))
     return replace(found, bound=(min(bound, found.objective[0]), *found.bound[1:]))
-
-
-_Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
-STEPS = 400  # weights that are tried at most
-CLOSE = 1e-9  # differences that are none, over the size of the values
-LABELS = 16_384  # of a level that are continued at most
 
 
 class _TooManyError(Exception):
@@ -563,84 +456,3 @@ class _TooManyError(Exception):
 
 class StopError(Exception):
     """The limit of time or of memory, as its text says, is reached."""
-
-
-def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
-    """Return an oracle of the shortest path and its lower bound."""
-
-    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
-        found = choose(graph, watch)
-        if not found.path:
-            raise StopError("time")
-        return found.path, found.bounds[0] if found.bounds else -np.inf
-
-    return cheapest
-
-
-class LeastTotal(NamedTuple):
-    """Incumbent, its value, lower bound and the weights (S,) that prove most of it."""
-
-    path: tuple[int, ...]
-    value: float
-    bound: float
-    weights: Floats
-
-
-def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
-    """Return the path of least total.
-
-    ``graph``: with a sum for every scenario, all of it on paths from the start to ends;
-    ``cheapest``: an oracle of the shortest path through a graph with one goal, and its bound.
-    """
-    best = by_weights(graph, aim, cheapest, watch)
-    if watch.over or best.bound >= best.value - CLOSE * abs(best.value):
-        return best._replace(bound=min(best.bound, best.value))
-    growth = _Totals(graph, aim, best.weights)  # labels close the gap that weights leave
-    known = LabelSearch(None, best.value, best.bound)
-    found = widening(growth, np.zeros(0), known, watch, LABELS)
-    path = best.path if found.arcs is None else tuple(graph.target[found.arcs].tolist())
-    return LeastTotal(path, found.cost, found.bound, best.weights)
-
-
-def by_weights(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
-    """Return the best path met on the way to the weights of the highest lower bound."""
-    count, best = len(graph.peaks), LeastTotal((), np.inf, -np.inf, np.zeros(0))
-
-    def met(weights: Floats) -> Plane:
-        nonlocal best
-        sums = (graph.amounts @ weights)[:, None]
-        path, bound = cheapest(Graph(graph.source, graph.target, sums, (False,), graph.ends))
-        totals = graph.amounts[moves_along(graph, path)].sum(axis=0)
-        if aim.value(totals) < best.value:
-            best = best._replace(path=path, value=aim.value(totals))
-        return Plane(0.0, totals, bound)
-
-    def ended(bound: float) -> bool:
-        watch.tell(best.value, bound)
-        return watch.over
-
-    region = Polyhedron(aim.most(count), counts=np.ones(count))
-    start = np.full(count, 1.0 / count)
-    weights, bound = highest_bound(met, start, region, ended, rounds=STEPS, closed=CLOSE)
-    return best._replace(bound=bound, weights=weights)
-
-
-class _Totals(SummedLabels):
-    """Labels of the totals of all scenarios, bounded by weights (S,), and by single scenarios."""
-
-    def __init__(self, graph: Graph, aim: RobustAim, weights: Floats) -> None:
-        super().__init__(graph, graph.amounts)
-        scenarios, self._aim = len(weights), aim
-        single = np.eye(scenarios if aim.most(scenarios) >= 1 else 0, scenarios)
-        self._weights = np.vstack([weights, single])
-        left = [distances(graph, graph.amounts @ own, back=True) for own in self._weights]
-        self._left = np.column_stack(left)
-
-    def bounds(self, state: Ints, taken: Floats) -> Floats:
-        """Return a lower bound of the aim by totals of paths."""
-        weighed = taken @ self._weights.T + self._left[state]
-        return np.asarray(weighed.max(axis=1, keepdims=True))
-
-    def values(self, taken: Floats, _: int) -> Floats:
-        """Return the aim of totals."""
-        return self._aim.each(taken)

@@ -26,9 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.choice import Choice, shortest
-from formulations.on_graph import on_graph
-from formulations.states._search import (
+from formulations._search import (
     Options,
     StopError,
     Watching,
@@ -39,11 +37,12 @@ from formulations.states._search import (
     unproven,
     watched,
 )
+from formulations.on_graph import Choice, on_graph, shortest
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
-from seqopt.graph._orders import TooManySetsError, order_rules
+from seqopt.graph._spaces import TooManySetsError, order_rules
 from seqopt.graph.formulation import Solution, Watch, find_formulation
 from seqopt.graph.graph import Graph
-from seqopt.graph.states.states import States
+from seqopt.graph.states import States
 from seqopt.scene.scene import Order
 
 HOW = Options(width=50, growth=1.1, dear=False)
