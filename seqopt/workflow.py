@@ -33,7 +33,6 @@ from seqopt.problem.requirements import (
 )
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
-from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.part import Part, _Place, find_scene, find_schedule
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 
-from seqopt.sequence.rules import Ending, Newest, RuleBook
+from seqopt.sequence.rules import Ending, Newest, _RuleBook
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.steps import Grips, StepKind
 
 
-class PlainBook(RuleBook):
+class PlainBook(_RuleBook):
     """The second book of rules with all steps that follow from a state, one by one."""
 
     @cached_property

@@ -40,7 +40,7 @@ from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, in_order
-from seqopt.sequence.rules import RuleBook
+from seqopt.sequence.rules import _RuleBook
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
@@ -112,7 +112,7 @@ class AllOrders(OneSchedule):
         for brick in self._rules.next_bricks(stand) if len(own) else ():
             order = self._order(part, brick)
             worlds = tuple(in_order(scene, order) for scene in problem.worlds)
-            book = RuleBook(build_network(self._rules.scene, order), problem.free_rules, worlds)
+            book = _RuleBook(build_network(self._rules.scene, order), problem.free_rules, worlds)
             tables = RuleTables(book, [], parks=problem.parks)
             rows = self._renumbered(order, own, back=True)
             for move in tables.successors(len(stand), rows):

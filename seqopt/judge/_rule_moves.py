@@ -17,8 +17,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.scene.scene import Scene, posture_rules
-from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload, RuleBook, unbearable
+from seqopt.scene.scene import Scene, _posture_rules
+from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload, _RuleBook, _unbearable
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
 from seqopt.sequence.steps import Grips, Step, StepKind
 
@@ -84,7 +84,7 @@ class _Tables:
         self.nodes = np.array([-1, *nodes])
         self._at = np.array([[np.nan] * 3, *(scene.node_position(node) for node in nodes)])
         self._place = {node: place for place, node in enumerate(self.nodes.tolist())}
-        self._postures = posture_rules(scene, team)
+        self._postures = _posture_rules(scene, team)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -152,7 +152,7 @@ class RuleTables(_Tables):
         raise NotImplementedError
 
     def __init__(
-        self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
+        self, book: _RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
     ) -> None:
         scene = book.network.scene
         super().__init__(scene, book.team, groups, parks=parks)
@@ -361,7 +361,7 @@ class ScheduleTables(_Tables):
         scene = network.scene
         super().__init__(scene, tuple(range(len(scene.robots))), parks=parks)
         self._schedule, self.first, self.last = schedule, 0, len(schedule.steps)
-        self._heavy = unbearable((scene, *worlds), schedule.steps, None)
+        self._heavy = _unbearable((scene, *worlds), schedule.steps, None)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)
@@ -443,9 +443,9 @@ def check_free(
     network: Network, rules: FreeRules, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
 ) -> None:
     """Require that a checked sequence keeps the rules of a free schedule; forces are not asked."""
-    tables, heavy = RuleTables(RuleBook(network, rules, worlds), []), dict[int, str]()
+    tables, heavy = RuleTables(_RuleBook(network, rules, worlds), []), dict[int, str]()
     if rules.payload is Payload.KEPT:
-        heavy = unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
+        heavy = _unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
     level, state = tables.first, tables.start()
     for step in steps:
         if step.number in heavy:

@@ -31,8 +31,8 @@ from seqopt.problem.requirements import StepArrays, _first_fault
 from seqopt.responses._tolerance import is_tolerance, misfits_along, step_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, EXCESS_COLUMN, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
-from seqopt.scene.scene import Order, check_postures
-from seqopt.sequence.rules import check_carried
+from seqopt.scene.scene import Order, _check_postures
+from seqopt.sequence.rules import _check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability.standing import _size, slack
@@ -183,10 +183,10 @@ def _as_claimed(problem: States, selection: Solution, steps: Sequence[Step]) -> 
     """Return the recomputed values of feasible steps; a `SolverError` if others were claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)
-        check_carried(problem.network.scene, steps, problem.worlds)
+        _check_carried(problem.network.scene, steps, problem.worlds)
     else:
         check_free(problem.network, problem.rules, steps, problem.worlds)
-    check_postures(problem.network.scene, steps)
+    _check_postures(problem.network.scene, steps)
     values = plan_values(problem, steps, selection.objective, selection.starts)
     for goal, value, claimed in zip(problem.names, values, selection.objective, strict=True):
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):

@@ -20,7 +20,7 @@ from seqopt.judge._twin import exceeds, own_values, twin_of
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import Block, solve_sets
-from seqopt.sequence.rules import RuleBook
+from seqopt.sequence.rules import _RuleBook
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing, StandingSets
 
@@ -136,7 +136,7 @@ class StateEvaluator:
             asked = rules, problem.network
             self.tables = ScheduleTables(*asked, parks=problem.parks, worlds=problem.worlds)
         else:
-            book = RuleBook(problem.network, rules, problem.worlds)
+            book = _RuleBook(problem.network, rules, problem.worlds)
             groups = interchangeable(book, most, timed=problem.is_timed)
             self.tables = RuleTables(book, groups, parks=problem.parks)
         team, nodes, kinds = list(self.tables.team), self.tables.nodes, scene.grip_kinds
@@ -328,7 +328,7 @@ def largest_load(problem: States, robot: int, *, stand: bool) -> float:
 
 
 def interchangeable(
-    book: RuleBook, most: Sequence[float], *, timed: bool = False
+    book: _RuleBook, most: Sequence[float], *, timed: bool = False
 ) -> list[tuple[int, ...]]:
     """Return the robots that could change places, group by group; ``timed``: also in time."""
     scene, last = book.network.scene, len(book.network.inner)

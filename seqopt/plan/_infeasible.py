@@ -39,7 +39,8 @@ from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
-from seqopt.sequence.rules import FREE, RuleBook, unbearable
+from seqopt.sequence.rules import FREE, _RuleBook
+from seqopt.sequence.rules import _unbearable as too_heavy_steps
 from seqopt.sequence.schedule import OpenStep, loads
 from seqopt.stability.standing import Standing
 
@@ -280,7 +281,7 @@ def _where(problem: States, reached: int) -> str:
     down, at = rules.takes_down, space.bricks_at(reached) + (not rules.takes_down)
     left, done = (range(at, end, -1), "removed") if down else (range(at, end + 1), "placed")
     where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
-    book = RuleBook(problem.network, rules, problem.worlds)
+    book = _RuleBook(problem.network, rules, problem.worlds)
     for bricks in left:
         near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
         heavy = book.too_heavy(bricks, near)
@@ -292,7 +293,7 @@ def _where(problem: States, reached: int) -> str:
 def _unbearable(problem: States) -> dict[int, str]:
     """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
     steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
-    return unbearable((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
+    return too_heavy_steps((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
 
 
 Way = tuple[str, str, States]  # the filter that is loosened, how in words, and the problem then

@@ -16,7 +16,6 @@ from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
 from seqopt.problem.requirements import Filter, Limit, require_parts
 from seqopt.responses._grip_sets import HERE, Resources
-from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule

@@ -15,7 +15,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.responses.table import analyze
-from seqopt.scene.scene import check_postures
+from seqopt.scene.scene import _check_postures
 from seqopt.sequence.rules import FREE, Payload, _usual_grips
 from seqopt.sequence.steps import Step, _begin_step
 
@@ -31,7 +31,7 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
     if kept and (over := _carrying_excesses(scene, begun)):
         raise StepError(f"payload exceeded: {over[0]}")
     check_free(states.network, rules, steps)
-    check_postures(scene, steps)
+    _check_postures(scene, steps)
     if kept and (excess := overloads(scene, analyze(states.engine, steps))):
         raise StepError(f"payload exceeded: {excess[0]}")
     starts: tuple[float, ...] = ()  # s, at the earliest, where steps wait for mortar

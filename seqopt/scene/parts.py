@@ -38,7 +38,7 @@ from seqopt.scene._checks import (
     wholes,
 )
 from seqopt.scene.arm import Arm, Durations
-from seqopt.scene.shape import Polyhedron, convex_polygon
+from seqopt.scene.shape import Polyhedron, _convex_polygon
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -284,7 +284,7 @@ class Spring(Terse):
         check(self, where, position=vector)
         unit_axes(self, where, "along", "across")
         check(self, where, translational_stiffness=stiffness, rotational_stiffness=stiffness)
-        check(self, where, thickness=length, face=convex_polygon)
+        check(self, where, thickness=length, face=_convex_polygon)
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:

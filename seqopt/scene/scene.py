@@ -522,7 +522,7 @@ def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | No
         from_arms("find_postures")(scene, cache, tell)
 
 
-def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
+def _within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
     """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
 
     That of an arm is in reach if a posture of it is possible when the brick is placed.
@@ -537,9 +537,9 @@ def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
     )
 
 
-def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
+def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
-    nodes = tuple(node for brick in within_reach(scene, robot)[:bricks] for node in brick)
+    nodes = tuple(node for brick in _within_reach(scene, robot)[:bricks] for node in brick)
     if robot.arm is None:
         return nodes
     until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
@@ -547,7 +547,7 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     return tuple(node for node in nodes if until[place[node]] > bricks)
 
 
-def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
+def _go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
     """Return which states (n,) of a scene with arms have postures that go together.
 
     ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
@@ -565,13 +565,13 @@ class _NoRules:
         return np.ones(len(states), dtype=bool)
 
 
-def posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
+def _posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
     """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
     rules: _NoRules = from_arms("PostureRules")(scene, team) if scene.has_arms else _NoRules()
     return rules
 
 
-def check_postures(scene: Scene, steps: Sequence[object]) -> None:
+def _check_postures(scene: Scene, steps: Sequence[object]) -> None:
     """Raise a `StepError` if arms have no postures that go together in a step.
 
     Or if the compliance of their grips is not that of their joints.

@@ -165,7 +165,7 @@ def bend(corners: Floats) -> float:
     return float(np.abs((corners - corners.mean(axis=0)) @ normal).max() / size)
 
 
-def convex_polygon(
+def _convex_polygon(
     where: str, corners: Iterable[Iterable[float]]
 ) -> tuple[tuple[float, float], ...]:
     """Return the corners of a convex polygon that has an area, counterclockwise, m."""

@@ -23,7 +23,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
-from seqopt.scene.scene import Scene, go_together, within_reach
+from seqopt.scene.scene import Scene, _go_together, _within_reach
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried, islands
@@ -144,7 +144,7 @@ class StateRows(Terse):
             return np.ones(len(states), dtype=bool)
         held = np.zeros((len(states), len(scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return go_together(scene, bricks, held)
+        return _go_together(scene, bricks, held)
 
     def codes(self, states: Ints) -> Ints:
         """Return a code (n,) per state (n, c), unique in its level."""
@@ -503,7 +503,7 @@ def free_space(
     alike: dict[tuple[object, ...], RobotKind] = {}
     for i in rules.team(scene):
         robot = scene.robots[i]
-        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(within_reach(scene, robot))])
+        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(_within_reach(scene, robot))])
         newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
         for k, brick in enumerate(scene.placed if newest is not reach else ()):
             with suppress(StepError):  # it reaches none

@@ -17,7 +17,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Brick, Robot, Side
-from seqopt.scene.scene import Scene, reachable, within_reach
+from seqopt.scene.scene import Scene, _reachable, _within_reach
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 
@@ -73,7 +73,7 @@ def _take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if within_reach(scene, scene.robots[robot])[k]}
+        able = {robot for robot in rank if _within_reach(scene, scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
@@ -101,7 +101,7 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
 
     Bricks are indices in build order; of all assignments the lexicographically first, by role.
     """
-    reach = {r: within_reach(scene, scene.robots[r]) for r in robots}
+    reach = {r: _within_reach(scene, scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
 
     @cache  # as many calls as there are sets of robots, not orders
@@ -157,7 +157,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
     """
-    free = within_reach(network.scene, robot)[network.scene.since[brick.name] - 1]
+    free = _within_reach(network.scene, robot)[network.scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
@@ -193,7 +193,7 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
         present = [step for step in steps if number in step.moves]
         first = present[0]
         robot = scene.robots[first.grips.index(OpenGrip(number))]
-        nodes = reachable(scene, robot, first.bricks)
+        nodes = _reachable(scene, robot, first.bricks)
         if first.kind is StepKind.PLACE:  # what places a brick holds it
             nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
         held = {grip for step in present for grip in step.grips}
@@ -452,7 +452,7 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
     def is_free(robot: int, window: Sequence[Step]) -> bool:
         held = {node for step in window for node in step.held}
         idle = all(step.grips[robot] is None for step in window)
-        return idle and bool({*reachable(scene, scene.robots[robot], window[0].bricks)} - held)
+        return idle and bool({*_reachable(scene, scene.robots[robot], window[0].bricks)} - held)
 
     for k, step in enumerate(plain):
         given: dict[int, _Grip] = dict(enumerate(step.grips))

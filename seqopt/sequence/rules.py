@@ -17,7 +17,7 @@ from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
-from seqopt.scene.scene import Scene, reachable
+from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.schedule import Move, Near
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
@@ -397,7 +397,7 @@ def with_robots(scene: Scene, count: int) -> Scene:
     return scene.with_robots(*robots)
 
 
-def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
+def _too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
     """Describe the robots that cannot carry a brick and their tool in a scene; or empty.
 
     ``place``: index of the brick in build order, may be negative.
@@ -416,7 +416,7 @@ def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str
     return ""
 
 
-def unbearable(
+def _unbearable(
     scenes: Sequence[Scene], steps: Sequence[AnyStep], begin: Site | None
 ) -> dict[int, str]:
     """Return the steps whose robot cannot carry its brick in some scene: reasons by number.
@@ -432,21 +432,21 @@ def unbearable(
             r for r, pair in enumerate(zip(before, step.grips, strict=True)) if len({*pair}) > 1
         ]
         if step.kind in moves and (
-            why := too_heavy(scenes, step.bricks + moves[step.kind], changed)
+            why := _too_heavy(scenes, step.bricks + moves[step.kind], changed)
         ):
             out[step.number] = why
         before = step.grips
     return out
 
 
-def check_carried(scene: Scene, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()) -> None:
+def _check_carried(scene: Scene, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()) -> None:
     """Require that robots can carry the bricks that they place or remove, also in scenarios."""
-    for number, why in unbearable((scene, *worlds), steps, None).items():
+    for number, why in _unbearable((scene, *worlds), steps, None).items():
         raise StepError(f"step {number}: {why}")
 
 
 @dataclass(frozen=True)
-class RuleBook:
+class _RuleBook:
     """The rules of a free schedule in a scene.
 
     ``worlds``: the scenes of scenarios, with other weights.
@@ -479,7 +479,7 @@ class RuleBook:
         """By robot and brick count, the nodes that it may hold."""
         scene = self.network.scene
         counts = range(len(scene.placed) + 1)
-        return {(r, b): reachable(scene, scene.robots[r], b) for r in self.team for b in counts}
+        return {(r, b): _reachable(scene, scene.robots[r], b) for r in self.team for b in counts}
 
     @cached_property
     def takes(self) -> dict[tuple[int, int], tuple[int, ...]]:
@@ -508,7 +508,7 @@ class RuleBook:
         """Describe the robots that cannot carry the newest brick in a scenario; or empty."""
         if self.rules.payload is Payload.IGNORED:
             return ""
-        return too_heavy((self.network.scene, *self.worlds), bricks - 1, robots)
+        return _too_heavy((self.network.scene, *self.worlds), bricks - 1, robots)
 
     def places(self, robot: int, bricks: int) -> bool:
         """Return whether a robot may place or remove the newest brick."""

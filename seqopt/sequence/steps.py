@@ -13,7 +13,7 @@ from numbers import Integral
 from seqopt.errors import StepError
 from seqopt.scene._checks import finite, settle, short
 from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene, reachable
+from seqopt.scene.scene import Scene, _reachable
 
 Grips = tuple[int | None, ...]
 
@@ -153,7 +153,7 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str
         reason = "the node is out of its reach"
     else:
         return
-    nodes = reachable(scene, robot, step.bricks)
+    nodes = _reachable(scene, robot, step.bricks)
     possible = ", ".join(map(str, nodes)) or "no node"
     if len(nodes) > 12:
         possible = f"{len(nodes)} nodes from {nodes[0]} to {nodes[-1]}"

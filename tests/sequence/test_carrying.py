@@ -16,7 +16,7 @@ from seqopt.plan.front import find_front
 from seqopt.plan.pose import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
-from seqopt.sequence.rules import FreeRules, check_carried, too_heavy
+from seqopt.sequence.rules import FreeRules, _check_carried, _too_heavy
 from seqopt.sequence.schedule import can_carry, loads
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, best_values
@@ -156,7 +156,7 @@ def test_states_of_a_loop_are_refused_and_judged_too():
         judge_schedule(graph_of(weak), plan.selection, plan.steps)
     assert judge_schedule(graph_of(strong), plan.selection, plan.steps).gap == 0
     with pytest.raises(StepError, match=r"step 2: brick \d weighs"):
-        check_carried(engine.network.scene, plan.steps)
+        _check_carried(engine.network.scene, plan.steps)
 
 
 @pytest.mark.parametrize("rules", [ANYHOW, DOWN])
@@ -206,7 +206,7 @@ def test_a_tool_is_carried_as_well():
     armed = scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
     assert loads(armed, armed.robots[0]) == pytest.approx([LIGHT + 0.0981] * 4)
     assert [can_carry([armed], r).tolist() for r in (0, 1)] == [[True] * 4, [False] * 4]
-    said = too_heavy([armed], 0, (0, 1))
+    said = _too_heavy([armed], 0, (0, 1))
     assert (
         said == "brick 1 weighs 23.5 N, more than the payload of rob2 (24 N, its tool weighs 1.0 N)"
     )
