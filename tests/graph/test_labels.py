@@ -179,6 +179,7 @@ def conditional(problem):
     return replace(problem, criterion=criterion)
 
 
+@pytest.mark.slow
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
     cascade, other = solve(problem25, "cascade"), conditional(problem25)

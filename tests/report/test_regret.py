@@ -156,6 +156,7 @@ def test_incumbents_over_time_are_drawn_where_a_way_tells_them(measured):
     assert ":" not in {line.get_linestyle() for line in regret_chart(bare).axes[0].get_lines()}
 
 
+@pytest.mark.slow
 def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     scene = small_arch(3).with_grips(1e5)
     found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)
@@ -167,7 +168,7 @@ def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
 
 @pytest.mark.slow
 def test_a_plan_that_falls_has_no_regret():
-    engine = partial(seqopt.make_engine, "auto", small_arch(5))
+    engine = partial(seqopt.make_engine, "auto", small_arch(4))
     found = measure_regret(engine(mortar="dry"), WORST, **ONCE)
     assert found.valued == "compliance, where every step stands"
     fallen = found.table["status"] == FALLS
