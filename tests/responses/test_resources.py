@@ -256,7 +256,7 @@ def test_a_name_changes_no_choice(name, criterion):
 
 
 @settings(max_examples=10)
-@given(first=st.text("1_ F", max_size=4), second=st.text("1_ F", max_size=4))
+@given(first=st.text("1 _F[],", max_size=4), second=st.text("1 _F[],", max_size=4))
 def test_no_two_robots_share_a_name(first, second):
     taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
     assert robot_response(first) not in taken
