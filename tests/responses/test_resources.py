@@ -11,7 +11,7 @@ from operator import itemgetter
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import seqopt
@@ -256,6 +256,7 @@ def test_a_name_changes_no_choice(name, criterion):
 
 
 @settings(max_examples=10)
+@example(first=" ", second="[ ]")
 @given(first=st.text("1 _F[],", max_size=4), second=st.text("1 _F[],", max_size=4))
 def test_no_two_robots_share_a_name(first, second):
     taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
