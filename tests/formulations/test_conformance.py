@@ -239,6 +239,7 @@ def test_an_interrupt_is_said_though_the_search_may_have_ended(name, problem8):
     assert plan.trace == tuple(came)
 
 
+@pytest.mark.slow
 def test_where_no_path_is_found_yet_its_bound_is_said(problem25):
     """However it ends; labels have a choice within budgets before they can be interrupted."""
 

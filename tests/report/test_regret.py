@@ -109,6 +109,7 @@ def measured():
     return measure_regret(seqopt.make_engine("compliance", small_arch(4)), RANKS, **ONCE)
 
 
+@pytest.mark.slow
 def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
     """A second route: the worst of all steps, and of the end, by the table of responses."""
     engine = seqopt.make_engine("compliance", small_arch(4))
@@ -127,6 +128,7 @@ def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
     assert rows["compliance", "loop", "overlap_dp", "ranks"] == pytest.approx(max(shares))
 
 
+@pytest.mark.slow
 def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
     table = measured.table
     assert {"loop", FREE} == {*table["schedule"]}

@@ -179,6 +179,7 @@ def test_the_judge_knows_it_by_itself(rules):
         judge_schedule(strong, plan.selection, swapped)
 
 
+@pytest.mark.slow
 def test_bricks_are_carried_in_every_scenario():
     scene = wall(30.0, 30.0, heavy=False)
     bricks = tuple(replace(brick, density=1.5 * brick.density) for brick in scene.bricks)
