@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Iterable
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
+
+
+@cache
+def _installed(_path: tuple[str, ...], group: str) -> EntryPoints:
+    """Those on a path, for which a file of every installed package is read: 5 ms."""
+    return entry_points(group=group)
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
@@ -13,7 +21,7 @@ def plugins(group: str) -> dict[str, EntryPoint]:
     >>> sorted(plugins("seqopt.limit_analysis"))
     ['lp', 'socp']
     """
-    return {entry.name: entry for entry in entry_points(group=group)}
+    return {entry.name: entry for entry in _installed(tuple(sys.path), group)}
 
 
 class SeqoptError(Exception):

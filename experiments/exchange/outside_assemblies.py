@@ -150,7 +150,7 @@ PLAN, LACKS = "plan", "lacks"
 TRIED = 12  # steps of a plan that are put to the certificate, beside the last
 NEAR = ((120, 0), (300, 6))  # bricks up to which candidates are all, or so many joints away
 LEAST = 8  # plans
-QUICK = ("bridge.json", "A.json", "armadillo.json")
+QUICK = ("bridge.json", "A.json")
 
 
 def run(*words: str) -> tuple[int, str]:
@@ -257,7 +257,7 @@ def experiment(options: Options) -> Finding:
 CLAIM = Claim(
     experiment,
     digits=6,
-    quick="three samples",
+    quick="two samples",
     options=(Option("--files", "folder of clones of the repositories named", ""),),
     needs=(Extra("compas_cra", "pip install 'seqopt[witness]'"),),
     pictures={"outside_assemblies.png": chart},

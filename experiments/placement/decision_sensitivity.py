@@ -218,7 +218,7 @@ def holds(table: pd.DataFrame) -> bool:
 
 def experiment(options: Options) -> Finding:
     grids = {kind: sizes[-1:] for kind, sizes in GRIDS.items()} if options.quick else GRIDS
-    table = measure(load_scene("arch25"), scenarios(grids, 3 if options.quick else SEEDS))
+    table = measure(load_scene("arch25"), scenarios(grids, 2 if options.quick else SEEDS))
     groups = table.groupby(["criterion", "kind", "size"], sort=False)
     mean = groups[list(MEASURES)].mean()
     mean["regret_error"] = groups["relative_regret"].sem()  # of the mean

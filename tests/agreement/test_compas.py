@@ -32,7 +32,11 @@ FOLDER = Path(compas_cra.SAMPLE)
 SNAKE = pytest.param("snake", marks=pytest.mark.slow)
 QUICK = ("bridge",)
 OTHERS = {*SAMPLES} - {"armadillo_cra", "snake", *QUICK}
-SLOW = [pytest.param(n, marks=pytest.mark.slow) for n in sorted(OTHERS)]
+LARGE = ("cube-curve-short", "cube-curve-tall")  # curve-3-blocks has the same kind of faces
+SLOW = [
+    pytest.param(n, marks=[pytest.mark.slow, *[pytest.mark.long] * (n in LARGE)])
+    for n in sorted(OTHERS)
+]
 SMALL = [*QUICK, *SLOW, SNAKE]
 CURVED = {"curve-3-blocks", "cube-curve-short", "cube-curve-tall"}  # files have faces of the curves
 

@@ -39,6 +39,7 @@ def test_a_base_that_is_only_shown_hits_the_wall_as_its_twin_does(tmp_path, show
         find_postures(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", [True])
 def test_what_is_shown_collides_as_the_same_shapes_do(tmp_path, mesh):
     more = {}

@@ -228,6 +228,7 @@ def test_an_arm_holds_each_node_in_one_posture_whatever_the_order():
     assert two_arms().held_postures is None
 
 
+@pytest.mark.slow
 def test_the_stiffest_is_taken_of_those_that_are_as_good():
     """Where a posture hits nothing and is in no one's way, no such one is stiffer."""
     scene = soft()

@@ -115,7 +115,13 @@ def folder(tmp_path, monkeypatch, capsys):
     return tmp_path
 
 
-@pytest.mark.parametrize("words", [["replan", "plan", "--no-stability"], ["reach", "s.json"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(["replan", "plan", "--no-stability"], marks=pytest.mark.slow),
+        ["reach", "s.json"],
+    ],
+)
 def test_postures_are_kept_and_taken(folder, words, monkeypatch):
     _known.cache_clear()
     assert main([*words, "--cache", "kept"]) == 0

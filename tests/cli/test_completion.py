@@ -15,7 +15,7 @@ pytest.importorskip("argcomplete")
     ("line", "want"),
     [
         ("seqopt op", {"optimize"}),
-        ("seqopt compare --engine dis", {"discrete"}),
+        pytest.param("seqopt compare --engine dis", {"discrete"}, marks=pytest.mark.slow),
         pytest.param("seqopt optimize --formul", {"--formulation"}, marks=pytest.mark.slow),
         pytest.param("seqopt compare --engine qqq", set(), marks=pytest.mark.slow),
     ],

@@ -109,7 +109,7 @@ QUESTIONS = [
     {"criterion": "T_max,M_sup=2", "robots": "rob1,rob2", "candidates": "near:12"},
     FREE,
     {**FREE, "aim": "minmax,steps", "rules": ["newest=free"], "budgets": ["regrips=3"]},
-    {**FREE, "order": "search", "aim": "sum"},
+    pytest.param({**FREE, "order": "search", "aim": "sum"}, marks=pytest.mark.slow),
 ]
 
 

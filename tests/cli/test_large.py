@@ -100,7 +100,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
     monkeypatch.setattr(
         workflow, "Run", lambda seconds, _, *rest, **more: real(seconds, interrupt, *rest, **more)
     )
-    words = [*WORDS, "labels", "--budget", "travel=0.8"]
+    words = [*WORDS, "labels", "chain:bricks=8", "--budget", "travel=0.9"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()
     assert err == "seqopt: interrupted; the plan is the best that was met\n"

@@ -114,7 +114,7 @@ BAD = {
     f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
 }
 NO_ANSWER = {
-    f"{ROBUST} worst-peak --budget travel=0.8": "no plan is within all budgets; travel is at least",
+    f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
     f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
     f"{FREE} --stands bond=1e-9 --friction 0.01": "a bond of ",
     f"{FREE} --limit F_largest=1": "it becomes possible with F_largest=",

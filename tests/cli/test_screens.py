@@ -85,6 +85,7 @@ def test_numbers_are_read_where_they_are_given():
             [options[name].parse(value) for name, value in wrong.items()]
 
 
+@pytest.mark.slow
 def test_the_payload_that_is_said_to_be_enough_is(capsys):
     words = ["optimize", "arch25", "--robots", "2", "--no-stability"]
     assert main(words) == 0

@@ -19,7 +19,7 @@ from experiments.study.parts.counterpart_rows import COUNTERPARTS, ours, tabulat
 from tests.builders import ROOT
 
 ALWAYS = "criteria_variants"  # one that takes a second runs among the quick tests too
-LONG = ("identify_arch25", "dry_map", "dry_methods")
+LONG = ("identify_arch25", "dry_map", "dry_methods", "paper_counterparts")  # rows: below
 
 
 def marks(name):

@@ -69,6 +69,7 @@ def test_what_stands_and_what_does_not_is_seen_by_both(name):
         assert ours(freed)[0] is force_only(freed.scene, freed.friction).verdict is Verdict.FALLS
 
 
+@pytest.mark.slow
 def test_what_tension_leaves_open_is_decided_without_it():
     scene = sample_scene("curve-3-blocks")
     assert force_only(scene, 0.05).verdict is Verdict.UNDECIDED

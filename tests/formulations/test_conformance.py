@@ -70,7 +70,6 @@ class Clock:
 
 @every_aim
 @given(problem=problems())
-@settings(max_examples=8)
 def test_answers_are_certified_or_refused_as_infeasible(name, aim, problem):
     best = problem.best(aim)
     if not np.isfinite(best):
@@ -158,7 +157,6 @@ def test_budgets_are_kept_or_refused(name):
 
 @timely
 @given(problem=st.one_of(problems(), budgeted()), limit=st.integers(0, 60))
-@settings(max_examples=8)
 def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, limit):
     """On a clock that moves on whenever it is looked at."""
     formulation = ALL[name]
@@ -240,6 +238,7 @@ def test_an_interrupt_is_said_though_the_search_may_have_ended(name, problem8):
     assert plan.trace == tuple(came)
 
 
+@pytest.mark.slow
 def test_where_no_path_is_found_yet_its_bound_is_said(problem25):
     """However it ends; labels have a choice within budgets before they can be interrupted."""
 
@@ -288,7 +287,7 @@ def agrees(problem, name):
         assert proof.objective >= best - 1e-6
 
 
-@pytest.mark.parametrize("examples", [10, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [6, pytest.param(40, marks=pytest.mark.slow)])
 @takers
 def test_budgets_against_brute_force(name, examples):
     @given(problem=budgeted())
@@ -309,10 +308,10 @@ def problem8():
     return seqopt.pose(engine, seqopt.three_robot_loop(engine.network), EQUATIONS)
 
 
-@pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
+@pytest.mark.parametrize("criterion", ["equations-2-3", "weighted", "worst-ratio"])
 def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
     engine, count = seqopt.make_engine("compliance", small_arch(5)), 5
-    problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), criterion)
+    problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), CRITERIA[criterion])
     best = valued(problem, "rank_search", horizon=count)
     costs = of_layers(problem)
     assert best == pytest.approx(costs.best())

@@ -301,6 +301,7 @@ def test_a_margin_is_sought_among_what_stands_as_demanded(aim):
     assert set(plan.stability()["verdict"]) == {"stands"}
 
 
+@slow
 def test_a_second_margin_is_that_of_the_mortar_alone():
     """A tilt that is survived only with the bond that was found first was promised without."""
     with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of"):

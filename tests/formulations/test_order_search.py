@@ -163,7 +163,9 @@ def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("aim", "bricks"), [(WORST_TOTAL, 3), (cvar(0.5), 3)])
+@pytest.mark.parametrize(
+    ("aim", "bricks"), [(WORST_TOTAL, 3), pytest.param(cvar(0.5), 3, marks=pytest.mark.long)]
+)
 def test_totals_over_scenarios_equal_brute_force(aim, bricks):
     """By every formulation; a bound is proven where weights leave nothing open, else claimed."""
     scene = small_arch(bricks)

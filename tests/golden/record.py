@@ -23,13 +23,13 @@ FREE = "optimize arch25 --schedule free"
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 QUICK = {
     "loop, ranks": "optimize arch25",
-    "loop, ranks, cascade": "optimize arch25 --formulation cascade",
-    "loop, ratios, layers": f"optimize arch25 {WORST}",
-    "loop, budget of travel": "optimize arch25 --budget travel=16m",
     "free, ratios": f"{FREE} --aim minmax,steps",
     "free, wall": "optimize wall:columns=4,courses=3 --schedule free --aim minmax,steps",
 }
 SLOW = {
+    "loop, budget of travel": "optimize arch25 --budget travel=16m",
+    "loop, ranks, cascade": "optimize arch25 --formulation cascade",
+    "loop, ratios, layers": f"optimize arch25 {WORST}",
     "loop, ranks, linear program": "optimize arch25 --formulation overlap_lp",
     "loop, ranks, integer program": "optimize arch25 --formulation overlap_mip",
     "loop, ranks, labels": "optimize arch25 --formulation labels",

@@ -155,6 +155,7 @@ def test_rows_are_ranked_as_if_alone(rows):
         np.testing.assert_array_equal(ranks, alone)
 
 
+@pytest.mark.slow
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25):
     problem = pose(engine25, loop25, CONDITIONAL)
     choice = solve(problem, "cascade").choice
@@ -181,6 +182,7 @@ def conditional(problem):
     return replace(problem, criterion=criterion)
 
 
+@pytest.mark.slow
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
     cascade, other = solve(problem25, "cascade"), conditional(problem25)

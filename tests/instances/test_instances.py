@@ -23,7 +23,7 @@ def posed(kind):
     """A small problem of every kind of goal."""
     scene = with_robots(small_arch(4), 3).with_durations(TIMES, "rob1:fetch=75")
     if kind in ("sum", "capped", "tail"):
-        scene = seqopt.load_scene("chain:bricks=8")
+        scene = seqopt.load_scene(f"chain:bricks={6 if kind == 'tail' else 8}")
     engine = seqopt.make_engine("compliance", scene)
     worst = seqopt.CRITERIA["worst-ratio"]
     free, loop = seqopt.FreeRules(), seqopt.three_robot_loop(engine.network)

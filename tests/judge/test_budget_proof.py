@@ -122,7 +122,7 @@ def exactly_within(problem):
     }
 
 
-@pytest.mark.parametrize("draws", [12, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("draws", [12, pytest.param(60, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TAKERS)
 def test_none_is_within_only_where_enumeration_finds_none(name, draws):
     """Prices may rise without end where costs tie; rounding must not decide what is possible."""
@@ -179,6 +179,7 @@ def test_multipliers_bound_what_is_capped_and_others_are_refused(peak):
             budget_bounds(graph, (4.0,), (4.0,), ((1.0,), (none,)))
 
 
+@pytest.mark.slow
 def test_few_labels_stop_with_a_bound(problem25):
     capped = problem25.but(budgets=["travel=18m", "steps_over:F_largest=250:18"])
     best = solve(capped, "labels")

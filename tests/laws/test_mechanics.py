@@ -122,7 +122,6 @@ def test_a_worse_optimum_is_seen():
 
 UNITS = [(1e3, 1e-3, 1e3), (1e3, 1, 1), (1e-3, 1e3, 1e-3), (1e-3, 1, 1)]
 CASES = [(criterion, scales) for criterion in (EQUATIONS, CLOSEST) for scales in UNITS]
-CASES = [CASES[0], *(pytest.param(*case, marks=pytest.mark.slow) for case in CASES[1:])]
 
 
 def solved(scene, criterion):
@@ -138,6 +137,7 @@ def plain(arch25):
     return cache(lambda criterion: solved(arch25, criterion))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("criterion", "scales"), CASES)
 def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
     """Responses are rounded for ranks in the scene's own units."""
@@ -150,6 +150,7 @@ def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
         np.testing.assert_allclose(getattr(other, name), getattr(own, name), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):
     """The control: forces in kN rounded to 1 kN decide nothing."""
     _, nodes, _ = plain(EQUATIONS)

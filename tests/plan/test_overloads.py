@@ -41,6 +41,7 @@ def test_a_limit_that_a_fixed_step_exceeds_is_infeasible(arch25):
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_payloads_hold_on_every_step_or_are_named(arch25):
     kept = seqopt.optimize(arch25, limits=payload_limits(arch25))
     assert kept.overloads == ()

@@ -197,6 +197,7 @@ def test_a_plan_over_scenarios_shows_its_choice(aim):
     assert plan.goals == ("minmax" if aim == WORST_PEAK else str(aim),)
 
 
+@pytest.mark.slow
 def test_limits_hold_in_every_scenario():
     problem = posed()
     drawn = scenarios(problem.schedule.scene, count=5, seed=1)

@@ -179,6 +179,7 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
     assert 'data-ready="true"' not in shown(path, words=PLAIN)[0]  # the control
 
 
+@pytest.mark.slow
 @browser
 def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, tmp_path):
     own = seqopt.build_network(engine25.network.scene, "reversed")

@@ -109,6 +109,7 @@ def measured():
     return measure_regret(seqopt.make_engine("compliance", small_arch(4)), RANKS, **ONCE)
 
 
+@pytest.mark.slow
 def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
     """A second route: the worst of all steps, and of the end, by the table of responses."""
     engine = seqopt.make_engine("compliance", small_arch(4))
@@ -127,6 +128,7 @@ def test_regret_is_that_of_the_worst_step_in_the_reference(measured):
     assert rows["compliance", "loop", "overlap_dp", "ranks"] == pytest.approx(max(shares))
 
 
+@pytest.mark.slow
 def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
     table = measured.table
     assert {"loop", FREE} == {*table["schedule"]}
@@ -156,6 +158,7 @@ def test_incumbents_over_time_are_drawn_where_a_way_tells_them(measured):
     assert ":" not in {line.get_linestyle() for line in regret_chart(bare).axes[0].get_lines()}
 
 
+@pytest.mark.slow
 def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     scene = small_arch(3).with_grips(1e5)
     found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)
@@ -167,7 +170,7 @@ def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
 
 @pytest.mark.slow
 def test_a_plan_that_falls_has_no_regret():
-    engine = partial(seqopt.make_engine, "auto", small_arch(5))
+    engine = partial(seqopt.make_engine, "auto", small_arch(4))
     found = measure_regret(engine(mortar="dry"), WORST, **ONCE)
     assert found.valued == "compliance, where every step stands"
     fallen = found.table["status"] == FALLS

@@ -11,7 +11,7 @@ from operator import itemgetter
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import seqopt
@@ -145,10 +145,11 @@ def test_an_engine_that_remembers_is_seen():
 
 def test_the_scene_is_sent_and_no_operators(loop25):
     engine = make_engine("compliance", loop25.scene)
-    engine.solve(1, [[1]])  # what the scene knows of its grips and props goes along
-    engine.network.scene.prop_numbers(1, held=True)
+    first, *rest = blocks_of(loop25, 2048)  # operators of all brick counts
+    engine.solve(first.bricks, first.grips, Want.SCREEN)
+    engine.network.scene.prop_numbers(1, held=True)  # what the scene knows of its grips goes along
     before = len(packed(engine))
-    for block in blocks_of(loop25, 2048):  # operators of all brick counts
+    for block in rest:
         engine.solve(block.bricks, block.grips, Want.SCREEN)
     assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
     assert len(pickle.dumps(engine)) > 20 * before
@@ -255,7 +256,8 @@ def test_a_name_changes_no_choice(name, criterion):
 
 
 @settings(max_examples=10)
-@given(first=st.text(max_size=4), second=st.text(max_size=4))
+@example(first=" ", second="[ ]")
+@given(first=st.text("1 _F[],", max_size=4), second=st.text("1 _F[],", max_size=4))
 def test_no_two_robots_share_a_name(first, second):
     taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
     assert robot_response(first) not in taken

@@ -82,6 +82,7 @@ def test_the_least_friction_is_enough_and_less_is_not():
     assert any(falls(network, steps, Mortar(friction=0.98 * least)))
 
 
+@pytest.mark.slow
 def test_no_tilt_is_the_friction_of_the_mortar_and_more_tilt_fells_no_less(network, builds):
     upright = failure_map(network.scene, builds, ["dry"], values=[DRY.friction]).cases
     tilted = failure_map(network.scene, builds, ["dry"], "tilt", [0.0, 20.0]).cases
