@@ -257,10 +257,11 @@ def signature_of(function: Callable[..., Any]) -> Signature:
             continue
         known = signature_of(maker).options
         names = [n for n in known if n not in own or n == each.name]
-        options |= {n: replace(known[n], place=bool(called) and n == "scene") for n in names}
+        first = {n for n in names if called and (n == "scene" or known[n].default is MISSING)}
+        options |= {n: replace(known[n], place=n in first) for n in names}
         if each.name in names:
-            first = known[each.name].default if default is MISSING else default
-            options[each.name] = replace(known[each.name], default=first, place=option.place)
+            usual = known[each.name].default if default is MISSING else default
+            options[each.name] = replace(known[each.name], default=usual, place=option.place)
         spread[each.name] = Spread(maker, names, default, bool(called))
     return Signature(function, options, spread)
 

@@ -49,6 +49,7 @@ QUESTIONS = {
 """Options by the question that they answer, in the order in which help asks them."""
 FLAGS = {
     "begin": "from",
+    "bounds": "bound",
     "budgets": "budget",
     "count": "scenarios",
     "criterion": "criteria",
@@ -68,8 +69,8 @@ VALUES = dict(
         rounding=NAME=STEP limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
         schedule=NAME|FILE begin=PLAN:STEP|N
         to=PLAN:STEP|N direction=build|take-down measure=AIM count=N seed=N workers=N
-        candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
-        cache=DIR measured=FILE at=STEP lost=ROBOT missing=BRICK
+        candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bounds=FILE
+        cache=DIR measured=FILE at=STEP lost=ROBOT missing=BRICK below=VALUE
         """,
     )
 )
