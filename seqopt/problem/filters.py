@@ -30,6 +30,7 @@ from seqopt.problem.requirements import (
     LIMIT_TOLERANCE,
     LINEAR_RANGE,
     NAMES,
+    UNITS,
     Limit,
     as_limits,
     length_word,
@@ -259,7 +260,9 @@ def _limit_of(text: str, where: str) -> Limit:
         names = ("payload", *NAMES, LINEAR_RANGE)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
-    return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
+    if name == TOLERANCE:
+        return Limit(name, length_word(value, said))
+    return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
 
 def register(*parts: Amount | Filter | Resource | Part) -> None:
@@ -289,7 +292,7 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
         if not isinstance(part, Amount | Filter | Resource | Part):
             raise ProblemError(
                 f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
-                "Format of seqopt.exchange or a Command of seqopt.doors"
+                "Format of seqopt.exchange or a Command of seqopt"
             )
         taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
         if part.name in taken:

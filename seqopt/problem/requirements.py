@@ -57,6 +57,8 @@ choices speak for such a rounding.
 LARGEST = 1e100  # number: products of larger ones overflow
 CHOICE_RESPONSES = (*OFFERED, "F_move", "F_largest")  # of choices, and one per robot
 NAMES = (*CHOICE_RESPONSES, TOLERANCE)
+UNITS = {"F": "N", "T": "N", "C": "N", "M": "N m", "D": "m", "position": "m"}
+"""Units of numbers, by what they are of, or by the first letter of a response."""
 _LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 
 
@@ -471,15 +473,16 @@ def _response_along(scene: Scene, table: _Columns, name: str) -> np.ndarray:
     return np.asarray(np.fmax.reduce(forces))
 
 
-def number_word(text: str, where: str, *, zero: bool = False) -> float:
-    """Return a positive number, or zero too; ``where`` is the argument, for messages."""
+def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) -> float:
+    """Return a positive number, or zero too; ``where``, ``unit``: for messages."""
     try:
         value = float(text)
     except ValueError:
         value = -1.0
     if not 0 < value <= LARGEST and not (zero and value == 0):
         most = f" up to {LARGEST:g}" if value > LARGEST else ""
-        raise ProblemError(f"{where}: {text!r} is not a positive number{' or zero' * zero}{most}")
+        said = f"{text!r} is not a positive number{' or zero' * zero}{most}"
+        raise ProblemError(f"{where}: {said}{f'; give a number of {unit}' if unit else ''}")
     return value
 
 

@@ -32,7 +32,7 @@ def parse_grips(text: str) -> tuple[Any, Any]:
         try:
             numbers = [] if word in ("", "rigid") else [float(one) for one in word.split("x")]
         except ValueError:
-            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5"
+            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5 (N/m)"
             raise SceneError(f"{where}: {said}") from None
         found.append(None if not numbers else numbers[0] if len(numbers) == 1 else tuple(numbers))
     return found[0], found[1]
@@ -47,7 +47,7 @@ def parse_props(text: str, up: Vector, every: Callable[..., Any]) -> tuple[Prop,
     props, common, where = list[Prop](), dict[str, Any](), f"props {short(text)[1:-1]}"
     for word in map(str.strip, text.split(",")):
         place, _, stiffness = word.partition(":")
-        known = dict.fromkeys(("stiffness", "capacity"), (float, "a number"))
+        known = {"stiffness": (float, "a number of N/m"), "capacity": (float, "a number of N")}
         own = in_words(where, [f"stiffness={stiffness}"], known) if stiffness else {}
         if word.startswith("capacity="):
             common |= in_words(where, [word], known)

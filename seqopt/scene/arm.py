@@ -243,7 +243,7 @@ def _durations_in_words(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys(_NAMES, (float, f"a number, as {EXAMPLE}"))
+        known = dict.fromkeys(_NAMES, (float, f"a number of s, as {EXAMPLE}"))
         said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):
             before = out[index]
