@@ -21,10 +21,12 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.pose import default_formulation, pose
 from seqopt.plan.solve import _solve_run
+from seqopt.problem.amounts import parse_goals
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
 from seqopt.problem.requirements import (
     LARGEST,
+    UNITS,
     Filter,
     Limit,
     number_word,
@@ -149,7 +151,8 @@ def parse_numbers(
         if name not in known:
             hint, names = did_you_mean(name, known), ", ".join(known)
             raise ProblemError(f"{where} {text} does not exist{hint}; give one of {names}")
-        out[name] = number_word(value, f"{where} {text}", zero=zero)
+        unit = UNITS.get(name) or UNITS.get(name[0], "")
+        out[name] = number_word(value, f"{where} {text}", unit, zero=zero)
     return out
 
 
@@ -325,6 +328,8 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     """Return the problem that `optimize` solves, of the values of all of its parameters."""
     given, robots, order = asked["schedule"], asked["robots"], asked["order"]
     stands, robust, search = asked["stands"], asked["robust"], asked["search"]
+    if isinstance(asked["aim"], str):
+        parse_goals(asked["aim"])  # an unknown name is said before what a scene lacks
     part = given if isinstance(given, Part) else Part(schedule=given)
     free, sought = part.schedule == FREE, order == SEARCH
     scene = find_scene(asked["scene"], order=None if sought else order, robots=robots)

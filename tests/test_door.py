@@ -38,7 +38,7 @@ def test_both_tables_name_the_same_homes():
 LIGHT = ("numpy", "pandas", "scipy", "networkx")
 LATE = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
 SELDOM = (
-    *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
+    *("scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._spaces"),
     *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import io
 import json
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -13,6 +14,8 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt._cli.signatures import signature_of
 from seqopt._registry import COMMANDS
+from seqopt.instances import instance
+from seqopt.plan.plan import Plan
 from seqopt.questions import find_build
 from seqopt.report import report
 from seqopt.scene.parts import Prop
@@ -22,6 +25,7 @@ from tests.builders import small_arch
 
 ASKED = (seqopt.optimize, seqopt.pareto, seqopt.replan, seqopt.compare, seqopt.analyze)
 ASKED += (seqopt.assess, seqopt.export, seqopt.reach, times, report, find_build)
+ASKED += (instance, seqopt.judge_instance)
 SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
@@ -73,6 +77,31 @@ def test_a_plan_answers_for_its_scene(arch, tmp_path):
     assert "report.html" in repr(report(folder, stability=False))
     timed = times(plan.engine.network.scene.with_durations(SECONDS), plan.steps)
     assert timed.makespan == timed.times()["end_s"].iloc[-1]
+
+
+def test_a_plan_is_replanned_with_the_words_of_the_function():
+    own, whole = (inspect.signature(f).parameters for f in (Plan.replan, seqopt.replan))
+    assert [*own][1:] == [*whole][1:]
+    for name in {*own} - {"self", "search"}:
+        assert (own[name].default, own[name].annotation) == (
+            whole[name].default,
+            whole[name].annotation,
+        )
+
+
+def test_an_instance_is_asked_for_and_judged_by_name(tmp_path):
+    """As the commands do: with the words of `optimize`, and by files."""
+    found = instance("chain:bricks=7", "free", aim="minmax,steps", below=40.0)
+    words = ["chain:bricks=7", "--schedule", "free", "--aim", "minmax,steps", "--below", "40"]
+    assert main(["instance", *words, "--out", str(tmp_path / "own.npz")]) == 0
+    assert replace(
+        seqopt.read_instance(tmp_path / "own.npz"), name=found.name, facts={}
+    ) == replace(found, facts={})
+    answer = tmp_path / "answer.txt"
+    answer.write_text(" ".join(map(str, seqopt.solve(found).nodes)))
+    given = seqopt.judge_instance(str(tmp_path / "own.npz"), answer)
+    assert given == seqopt.judge_instance(found, answer)
+    assert given.gap == 0
 
 
 def test_words_make_grips_props_and_payloads():

@@ -71,7 +71,7 @@ class Answer:
 
     facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
     text: str = ""  # lines on standard output
-    data: str = ""  # a table as CSV for standard output, where no file is written for it
+    data: str = ""  # a table as CSV for standard output, if no file or text is; else if it is quiet
     written: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()  # further remarks: lines on standard error
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
@@ -124,7 +124,7 @@ def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) ->
         paths = "".join(f"{path}\n" for path in answer.written)
         show(answer.data or paths or f"{answer.text}\n")
     else:
-        if answer.data:
+        if answer.data and not answer.text:
             show(answer.data)
         if answer.text and not (answer.written and sys.stdout is None):
             show_text(answer.text)

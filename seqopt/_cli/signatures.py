@@ -49,8 +49,8 @@ WORD = re.compile(r"``(\w+)(?:=\"?([^`\"]*)\"?)?``")  # a parameter in a docstri
 class Option:
     """An option: the types that it takes, its default, and what a parser knows of it.
 
-    ``more``: ``choices``, ``const`` (what it is where no value follows), ``zero`` (whether a number
-    may be zero), ``least`` and ``most`` (of a whole number), ``parse``.
+    ``more``: ``choices``, ``const`` (what it is where no value follows), ``unit`` of a number and
+    whether it may be ``zero``, ``least`` and ``most`` (of a whole number), ``parse``.
     """
 
     name: str
@@ -106,7 +106,8 @@ class Option:
         if not isinstance(value, str):
             return value
         if self.kinds <= {float, type(None)}:
-            return number_word(value, self.flag, zero=self.more.get("zero", False))
+            how = {name: self.more[name] for name in ("unit", "zero") if name in self.more}
+            return number_word(value, self.flag, **how)
         if self.kinds <= {int, type(None)}:
             least, most = self.more.get("least", 1), self.more.get("most", MOST_WORKERS)
             return parse_count(value, self.flag, most, least)
@@ -258,10 +259,11 @@ def signature_of(function: Callable[..., Any]) -> Signature:
             continue
         known = signature_of(maker).options
         names = [n for n in known if n not in own or n == each.name]
-        options |= {n: replace(known[n], place=bool(called) and n == "scene") for n in names}
+        first = {n for n in names if called and (n == "scene" or known[n].default is MISSING)}
+        options |= {n: replace(known[n], place=n in first) for n in names}
         if each.name in names:
-            first = known[each.name].default if default is MISSING else default
-            options[each.name] = replace(known[each.name], default=first, place=option.place)
+            usual = known[each.name].default if default is MISSING else default
+            options[each.name] = replace(known[each.name], default=usual, place=option.place)
         spread[each.name] = Spread(maker, names, default, bool(called))
     return Signature(function, options, spread)
 

@@ -49,6 +49,7 @@ QUESTIONS = {
 """Options by the question that they answer, in the order in which help asks them."""
 FLAGS = {
     "begin": "from",
+    "bounds": "bound",
     "budgets": "budget",
     "count": "scenarios",
     "criterion": "criteria",
@@ -68,8 +69,8 @@ VALUES = dict(
         rounding=NAME=STEP limits=LIMIT budgets=BUDGET stands=MORTAR friction=F tilt=DEG
         schedule=NAME|FILE begin=PLAN:STEP|N
         to=PLAN:STEP|N direction=build|take-down measure=AIM count=N seed=N workers=N
-        candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bound=FILE
-        cache=DIR measured=FILE at=STEP lost=ROBOT missing=BRICK
+        candidates=RULE time_limit=SECONDS max_memory=SIZE plan=FILE source=FILE bounds=FILE
+        cache=DIR measured=FILE at=STEP lost=ROBOT missing=BRICK below=VALUE
         """,
     )
 )
@@ -78,9 +79,12 @@ HOW: dict[str, dict[str, Any]] = {
     "engine": {"choices": lambda: ENGINES},
     "method": {"choices": (*METHODS, PUBLISHED)},
     "friction": {"zero": True},
-    "tilt": {"zero": True},
+    "tilt": {"zero": True, "unit": "degrees"},
+    "density": {"unit": "kg/m³"},
+    "distance": {"unit": "m"},
+    "gap": {"unit": "m"},
     "robots": {"parse": lambda text: int(text) if text.isdecimal() else named(text)},
-    "time_limit": {"zero": True},
+    "time_limit": {"zero": True, "unit": "seconds"},
     "at": {"least": 0, "most": 1_000_000},
     "count": {"most": MOST},
     "seed": {"least": 0, "most": MOST},

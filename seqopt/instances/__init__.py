@@ -1,10 +1,10 @@
 """Compiled graphs that stand alone: read without a scene, written for any solver, judged anywhere.
 
 >>> import seqopt
->>> problem = seqopt.optimize("chain:bricks=7", "free", aim="minmax,steps").problem
->>> instance = seqopt.compile_instance(problem, below=40.0)
->>> plan = seqopt.solve(instance)
->>> seqopt.judge_instance(instance, plan.nodes).gap
+>>> from seqopt.instances import instance
+>>> graph = instance("chain:bricks=7", "free", aim="minmax,steps", below=40.0)
+>>> plan = seqopt.solve(graph)
+>>> seqopt.judge_instance(graph, plan.nodes).gap
 0.0
 
 Files hold the graph, goals and caps of its paths (`save_instance`, `read_instance`); MPS
@@ -18,13 +18,14 @@ from seqopt._registry import later
 if TYPE_CHECKING:
     from seqopt.instances._files import read_instance, save_instance
     from seqopt.instances.answers import judge_instance
-    from seqopt.instances.compiled import compile_instance
+    from seqopt.instances.compiled import compile_instance, instance
 
-__all__ = ["compile_instance", "judge_instance", "read_instance", "save_instance"]
+__all__ = ["compile_instance", "instance", "judge_instance", "read_instance", "save_instance"]
 __getattr__, __dir__ = later(
     __name__,
     {
         "compile_instance": "compiled",
+        "instance": "compiled",
         "judge_instance": "answers",
         "read_instance": "_files",
         "save_instance": "_files",

@@ -13,6 +13,7 @@ import numpy as np
 from seqopt._files import parse_json, read_text
 from seqopt.errors import ProblemError
 from seqopt.graph.instance import Instance
+from seqopt.instances._files import read_instance
 from seqopt.judge.arithmetic import Answer, Claim, judge_path
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import short
@@ -21,19 +22,25 @@ WHAT = ("nodes", "arcs", "acts")
 KEYS = ("value", "prices", "weights", "shares", "labels")
 
 
-def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certificate:
+def judge_instance(
+    instance: Instance | Path | str,
+    solution: Path | str | Sequence[int] | Mapping[str, Any],
+    bounds: Path | str | Sequence[Any] | Mapping[str, Any] | None = None,
+) -> Certificate:
     """Check a bare solution of an instance, and bounds with what is to prove them.
 
     Parameters
     ----------
-    instance : Instance
-        From `seqopt.read_instance` or `seqopt.compile_instance`.
-    solution : path, str, sequence of int or mapping
-        A file (JSON, CSV or plain text), or what it holds: the nodes of a path, or a mapping with
-        ``nodes``, ``arcs`` or ``acts`` and, if they are to be checked, ``values`` and ``bounds``.
-    bounds : path, sequence or mapping, optional
-        For every goal, the most important first, a mapping: ``value`` and what proves it:
-        ``prices``, ``weights``, ``shares``, ``labels``.
+    instance : Instance, pathlib.Path or str
+        File of seqopt instance; in Python also the instance.
+    solution : pathlib.Path, str, sequence of int or mapping
+        File with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
+        CSV or JSON; in Python also what it holds, as text, nodes or a mapping with ``nodes``,
+        ``arcs`` or ``acts`` and, if they are to be checked, values and bounds.
+    bounds : pathlib.Path, str, sequence or mapping, optional
+        JSON file with a ``value`` for every goal, the most important first, and what proves it:
+        ``prices``, ``weights``, ``shares``, ``labels``; in Python also what it holds (default: the
+        judge looks for a proof itself).
 
     Returns
     -------
@@ -58,7 +65,8 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
     >>> round(proof.objective, 5), proof.gap
     (657.46456, 0.0)
     """
-    return judge_path(instance, as_answer(instance, solution, bounds))
+    graph = read_instance(instance) if isinstance(instance, Path | str) else instance
+    return judge_path(graph, as_answer(graph, solution, () if bounds is None else bounds))
 
 
 def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:

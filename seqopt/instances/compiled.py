@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seqopt._registry import offered
 from seqopt.arrays import Ints
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.registry import DEFAULT
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._spaces import build_space
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import Graph, _on_paths, contracted
 from seqopt.graph.instance import (
     PEAK,
@@ -29,7 +33,77 @@ from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.plan.pose import graph_of
 from seqopt.plan.solve import without_shares
+from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim, Problem
+from seqopt.problem.requirements import Filter, Limit
+from seqopt.scene.scene import Scene
+from seqopt.sequence.part import Part
+from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing
+from seqopt.work.progress import Clock, Tell
+from seqopt.workflow import Robust, Search, pose_build
+
+SEARCH = Search()  # it is frozen
+
+
+def instance(  # noqa: PLR0913  # every question is a word of its own
+    scene: Scene | str | Path,
+    schedule: Schedule | Part | Path | str | None = None,
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    engine: str = DEFAULT,
+    *,
+    aim: str | None = None,
+    limits: Sequence[Limit | Filter | str] | str = (),
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    robust: Robust | None = None,
+    order: str | Sequence[int] | None = None,
+    mortar: Mortar | str | None = None,
+    robots: int | Sequence[str] | None = None,
+    candidates: str | None = None,
+    rules: FreeRules | Sequence[str] | str = (),
+    search: Search = SEARCH,
+    below: float = np.inf,
+    progress: Tell | None = None,
+) -> Instance:
+    """Return the graph of what `seqopt.optimize` would solve, for the same question.
+
+    Parameters
+    ----------
+    scene, schedule, criterion, formulation, engine, aim, limits, budgets, stands : optional
+        As of `optimize`.
+    robust, order, mortar, robots, candidates, rules, search : optional
+        As of `optimize`; of a search its time counts alone.
+    below : float, optional
+        Leave out states of which the first aim, a worst step, takes more; plans that are better
+        than this stay.
+    progress : callable, optional
+        Called with the progress.
+
+    Returns
+    -------
+    Instance
+
+    Raises
+    ------
+    InfeasibleError, ProblemError
+        As of `compile_instance`.
+
+    Examples
+    --------
+    >>> instance("chain:bricks=7", "free", aim="minmax,steps", below=40.0)
+    <Instance 'chain 7': 1613 nodes, 6405 arcs, minmax, steps>
+    """
+    asked, clock = locals(), Clock(search.time_limit)
+    with clock.needed("posing the problem"):
+        problem = pose_build(asked)
+    if progress is not None:
+        progress("computing all that arcs take")
+    own = None if formulation is None else find_formulation(formulation).aim
+    with clock.needed("writing down the graph"):
+        return compile_instance(problem, aim=own, below=below)
 
 
 def compile_instance(

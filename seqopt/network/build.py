@@ -1,34 +1,32 @@
-"""Build the network of a scene."""
+"""Build the network of a scene: its double cross as a graph, compiled to arrays once."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
+import networkx as nx
 import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import SceneError
-from seqopt.network.network import GROUND, Network, PartKind, Springs
+from seqopt.network.network import (
+    GROUND,
+    DoubleCross,
+    Network,
+    NodeData,
+    PartData,
+    PartKind,
+    Springs,
+)
 from seqopt.scene._checks import frames
 from seqopt.scene.parts import Ground, Joint
 from seqopt.scene.scene import Scene, in_order
 
 _EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 _Springs = list[tuple[Joint | Ground, int]]  # with the brick counts from which they act
-
-
-class _Part(NamedTuple):
-    """A node or an edge: its number, name or ends, kind, and the brick count that brings it."""
-
-    name: Any
-    kind: PartKind
-    since: int
-    spring: int = -1
-    brick: int = -1
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Network:
@@ -69,25 +67,8 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ]
     ascending = np.argsort(counts, kind="stable")
     springs = [(every[i], counts[i]) for i in ascending]
-    nodes, edges = _nodes_and_edges(scene, springs)
-    index = {node.name: i for i, node in enumerate(nodes)}
     support = np.argsort(ascending)[: len(scene.grounds)]
-    mass = np.array([brick.mass for brick in scene.placed])[:, None]
-    arrays = {
-        f"{what}_{name}": np.array([int(getattr(part, name)) for part in parts])
-        for what, parts in (("node", nodes), ("edge", edges))
-        for name in ("kind", "since", "spring", "brick")
-    }
-    return Network(
-        scene=scene,
-        springs=_springs(scene, springs, support, index),
-        node_position=np.array([node.position for node in nodes]),
-        node_name=tuple(index),
-        inner=np.array([[index[n] for n in brick.nodes] for brick in scene.placed]),
-        edge_nodes=np.array([[index[name] for name in edge.name] for edge in edges]),
-        weight=mass * (scene.weight_factor * np.array(scene.gravity)),
-        **arrays,
-    )
+    return compile_network(scene, double_cross(scene, springs), springs, support)
 
 
 def network_of(given: Network | Scene) -> Network:
@@ -98,27 +79,62 @@ def network_of(given: Network | Scene) -> Network:
     raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
-def _nodes_and_edges(scene: Scene, springs: _Springs) -> tuple[list[_Part], list[_Part]]:
-    """Return the parts of the double cross, those of a partial structure first."""
-    nodes, edges = list[_Part](), list[_Part]()
+def double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
+    """Return the graph of a scene: every brick, then every spring with what it brings."""
+    graph: DoubleCross = nx.DiGraph(name=scene.name)
     for i, brick in enumerate(scene.placed):
+        own = PartData(kind=PartKind.INNER, since=i + 1, spring=-1, brick=i)
         for number in brick.nodes:
-            at = brick.node_position(number)
-            nodes.append(_Part(number, PartKind.INNER, i + 1, brick=i, position=at))
-        edges.append(_Part(brick.nodes, PartKind.INNER, i + 1, brick=i))
+            graph.add_node(number, **NodeData(**own, position=brick.node_position(number)))
+        graph.add_edge(*brick.nodes, **own)
     for s, (name, (spring, since)) in enumerate(zip(_joint_names(springs), springs, strict=True)):
         ends, at = [scene.since[b] for b in spring.ends], spring.position
-        nodes.append(_Part(name, PartKind.JOINT, min(ends), s, position=at))
+        own = PartData(kind=PartKind.JOINT, since=min(ends), spring=s, brick=-1)
+        graph.add_node(name, **NodeData(**own, position=at))
         for count in ends:  # each brick meets it through its nearer node, or the first
             brick = scene.placed[count - 1]
             first, second = (math.dist(brick.node_position(node), at) for node in brick.nodes)
             met = brick.nodes[int(first > second * (1 + _EQUALLY_FAR))]
-            edges.append(_Part((met, name), PartKind.JOINT, count, s, count - 1))
+            graph.add_edge(met, name, **{**own, "since": count, "brick": count - 1})
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
-            nodes.append(_Part(base, PartKind.BASE, since, s, position=spring.anchor))
-            edges.append(_Part((name, base), PartKind.BASE, since, s))
-    return sorted(nodes, key=lambda n: n.since), sorted(edges, key=lambda e: e.since)
+            own = PartData(kind=PartKind.BASE, since=since, spring=s, brick=-1)
+            graph.add_node(base, **NodeData(**own, position=spring.anchor))
+            graph.add_edge(name, base, **own)
+    nx.freeze(graph)
+    return graph
+
+
+def compile_network(scene: Scene, graph: DoubleCross, springs: _Springs, support: Ints) -> Network:
+    """Compile a double cross to arrays; the order in which its parts were added does not matter."""
+    last = {end for _, end, data in graph.edges.data() if data["kind"] is PartKind.INNER}
+
+    def appears(part: tuple[Any, ...]) -> tuple[int, int, int, bool]:
+        data: PartData = part[-1]
+        return data["since"], data["spring"], data["kind"], part[0] in last
+
+    nodes: list[Any] = sorted(graph.nodes.data(), key=appears)
+    edges: list[Any] = sorted(graph.edges.data(), key=appears)
+    index = {name: i for i, (name, _) in enumerate(nodes)}
+    arrays = {
+        f"{what}_{key}": np.array([int(part[-1][key]) for part in parts])
+        for what, parts in (("node", nodes), ("edge", edges))
+        for key in PartData.__annotations__
+    }
+    joint = np.flatnonzero(arrays["node_kind"] == PartKind.JOINT.value)
+    ends = np.array([[index[name] for name in edge[:2]] for edge in edges])
+    mass = np.array([brick.mass for brick in scene.placed])[:, None]
+    return Network(
+        scene=scene,
+        graph=graph,
+        springs=_springs(scene, springs, support, joint[np.argsort(arrays["node_spring"][joint])]),
+        node_position=np.array([data["position"] for _, data in nodes]),
+        node_name=tuple(index),
+        inner=ends[arrays["edge_kind"] == PartKind.INNER.value],
+        edge_nodes=ends,
+        weight=mass * (scene.weight_factor * np.array(scene.gravity)),
+        **arrays,
+    )
 
 
 def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
@@ -132,9 +148,7 @@ def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
     return names
 
 
-def _springs(
-    scene: Scene, springs: _Springs, support: Ints, index: Mapping[object, int]
-) -> Springs:
+def _springs(scene: Scene, springs: _Springs, support: Ints, node: Ints) -> Springs:
     """Return springs as arrays; with a face, the first axis points into the second body."""
     each = [spring for spring, _ in springs]
     place = [[scene.since[name] - 1 for name in spring.ends] for spring in each]
@@ -149,7 +163,7 @@ def _springs(
     return Springs(
         bodies=np.array([sorted([GROUND, *ends][-2:]) for ends in place]),  # the lower one first
         since=np.array([since for _, since in springs]),
-        node=np.array([index[name] for name in _joint_names(springs)]),
+        node=node,
         position=position,
         anchor=anchor,
         axes=frames(along, np.array([spring.across for spring in each])),

@@ -7,21 +7,25 @@ fixed base node. So the parts of a partial structure come first in every array.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Container
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 import numpy as np
 
 from seqopt._registry import Shown, display
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import units
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
+    import networkx as nx
     from matplotlib.figure import Figure
+
+DoubleCross: TypeAlias = "nx.DiGraph[Any]"
 
 _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
@@ -39,6 +43,21 @@ class PartKind(IntEnum):
     INNER = 0  # inner node; edge between the inner nodes of a brick
     JOINT = 1  # joint node; half-edge between an inner node and a joint node
     BASE = 2  # fixed node of a ground end; stub that leads to it
+
+
+class PartData(TypedDict):
+    """What the graph says of every node and edge."""
+
+    kind: PartKind
+    since: int  # the brick count that brings it
+    spring: int  # of a joint or base node, a half-edge or stub; -1 of others
+    brick: int  # index in build order, of an inner node or edge and of a half-edge; -1 of others
+
+
+class NodeData(PartData):
+    """What the graph says of a node."""
+
+    position: Vector  # m
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,11 +116,14 @@ class Compliances(FrozenValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Network(Shown, FrozenValue):
-    """The double-cross network of a scene as arrays; see the module's text for the order.
+    """The double-cross network of a scene as a graph and as arrays, in the order of the module.
 
     Attributes
     ----------
     scene : Scene
+    graph : networkx.DiGraph
+        The double cross, which cannot be changed: nodes by ``node_name``, edges from the brick
+        outward; both say their kind, since, spring and brick, nodes their position too.
     springs : Springs
     node_position : (N, 3) float
         m.
@@ -136,6 +158,7 @@ class Network(Shown, FrozenValue):
     """
 
     scene: Scene
+    graph: DoubleCross = field(compare=False)
     springs: Springs
     node_position: Floats
     node_kind: Ints
@@ -290,6 +313,11 @@ class Network(Shown, FrozenValue):
     def count_edges(self, bricks: int) -> int:
         """Return the number of edges of a partial structure."""
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
+
+    def partial(self, bricks: int, loose: Container[int] = ()) -> DoubleCross:
+        """Return the graph of a partial structure, without the joints of loose springs."""
+        names = self.node_name[: self.count_nodes(bricks)]
+        return self.graph.subgraph(n for n in names if self.graph.nodes[n]["spring"] not in loose)
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the network, or its part of the first ``bricks``, in build order."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property, partial
+from functools import cached_property
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -14,15 +15,23 @@ import pandas as pd
 from seqopt._registry import display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
-from seqopt.engines.registry import provenance
+from seqopt.engines.registry import DEFAULT, provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states import States
 from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan.build import ShownBuild
+from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
+from seqopt.problem.requirements import (
+    LIMIT_TOLERANCE,
+    Excess,
+    Filter,
+    Limit,
+    _said_limits,
+    overloads,
+)
 from seqopt.responses._grip_sets import Moved
 from seqopt.responses._tolerance import is_tolerance, values_text
 from seqopt.responses.quantities import length_text
@@ -38,6 +47,7 @@ from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.stability._steps import stability_table
 from seqopt.stability.standing import Standing
+from seqopt.work.progress import Tell
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -110,10 +120,34 @@ class Plan(ShownBuild):
         outside = f"{OUTSIDE}: " if self.outside else ""
         return f"Plan({outside}{what}by {self.formulation.name}: {count}, {self._value})"
 
-    @property
-    def replan(self) -> Callable[..., Plan]:
+    def replan(  # noqa: PLR0913  # every question is a word of its own
+        self,
+        at: int = 1,
+        *,
+        lost: Sequence[str] = (),
+        missing: Sequence[int | str] = (),
+        payload: Sequence[float | str] = (),
+        grips: str | None = None,
+        durations: Sequence[str] = (),
+        robots: int | Sequence[str] | None = None,
+        to: Site | int | str | None = None,
+        measured: Path | str | None = None,
+        criterion: Criterion | str | None = None,
+        aim: str | None = None,
+        limits: Sequence[Limit | Filter | str] | str = (),
+        rules: Sequence[str] | str = (),
+        stands: Standing | Mortar | str | None = None,
+        formulation: str | None = None,
+        engine: str = DEFAULT,
+        mortar: Mortar | str | None = None,
+        search: Any = None,
+        progress: Tell | None = None,
+    ) -> Plan:
         """Plan the rest after a change, as `seqopt.replan`: ``plan.replan(12, lost=["rob3"])``."""
-        return partial(display(Plan, "replan"), self)
+        asked = {name: each for name, each in locals().items() if name != "self"}
+        asked = {name: each for name, each in asked.items() if each is not None}
+        found: Plan = display(Plan, "replan")(self, **asked)
+        return found
 
     @property
     def is_far(self) -> bool:

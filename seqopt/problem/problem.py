@@ -302,7 +302,7 @@ class Problem(Shown):
         parts += map(str, self.goals)
         for name in ("limits", "filters", "paths", "budgets", "scenarios"):
             count = len(getattr(self, name))
-            parts += [f"{count} {name}"] if count else []
+            parts += [f"{count} {name[: -1 if count == 1 else None]}"] if count else []
         parts += ["every state stands"] if self.stands is not None else []
         parts += [f"{self.orders.value} orders"] if self.orders is not None else []
         return f"Problem({', '.join(parts)})"

@@ -61,6 +61,8 @@ from seqopt.sequence.steps import AnyStep
 LARGEST = 1e100  # number: products of larger ones overflow
 CHOICE_RESPONSES = (*OFFERED, "F_move", "F_largest")  # of choices, and one per robot
 NAMES = (*CHOICE_RESPONSES, TOLERANCE)
+UNITS = {"F": "N", "T": "N", "C": "N", "M": "N m", "D": "m", "position": "m"}
+"""Units of numbers, by what they are of, or by the first letter of a response."""
 _LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 
 
@@ -602,7 +604,9 @@ def _limit_of(text: str, where: str) -> Limit:
         names = ("payload", *NAMES, LINEAR_RANGE)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
-    return Limit(name, (length_word if name == TOLERANCE else number_word)(value, said))
+    if name == TOLERANCE:
+        return Limit(name, length_word(value, said))
+    return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
 
 def register(*parts: Amount | Filter | Resource | Part) -> None:
@@ -632,7 +636,7 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
         if not isinstance(part, Amount | Filter | Resource | Part):
             raise ProblemError(
                 f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
-                "Format of seqopt.exchange or a Command of seqopt.doors"
+                "Format of seqopt.exchange or a Command of seqopt"
             )
         taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
         if part.name in taken:
@@ -640,15 +644,16 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
         ADDED[type(part), part.name] = part
 
 
-def number_word(text: str, where: str, *, zero: bool = False) -> float:
-    """Return a positive number, or zero too; ``where`` is the argument, for messages."""
+def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) -> float:
+    """Return a positive number, or zero too; ``where``, ``unit``: for messages."""
     try:
         value = float(text)
     except ValueError:
         value = -1.0
     if not 0 < value <= LARGEST and not (zero and value == 0):
         most = f" up to {LARGEST:g}" if value > LARGEST else ""
-        raise ProblemError(f"{where}: {text!r} is not a positive number{' or zero' * zero}{most}")
+        said = f"{text!r} is not a positive number{' or zero' * zero}{most}"
+        raise ProblemError(f"{where}: {said}{f'; give a number of {unit}' if unit else ''}")
     return value
 
 

@@ -26,7 +26,7 @@ from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
-from seqopt.network.network import GROUND, Network, PartKind
+from seqopt.network.network import Network
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words
@@ -93,13 +93,9 @@ def _structure_data(network: Network) -> dict[str, object]:
 
     Edges end with their brick count; ``carried`` are the bricks that every node moves with.
     """
-    scene, springs = network.scene, network.springs
+    scene, graph = network.scene, network.graph.to_undirected(as_view=True)
     cell = Cell(scene)
-    parts = (network.node_kind, network.node_brick, network.node_spring)
-    moving = [
-        [] if kind == PartKind.BASE.value else [brick] if brick >= 0 else springs.bodies[k].tolist()
-        for kind, brick, k in zip(*(part.tolist() for part in parts), strict=True)
-    ]
+    moving = ({data["brick"] for *_, data in graph.edges(n, data=True)} for n in network.node_name)
     return {
         "name": scene.name,
         "bricks": [
@@ -112,7 +108,7 @@ def _structure_data(network: Network) -> dict[str, object]:
             for node in brick.nodes
         },
         "points": _rounded(network.node_position),
-        "carried": [[body for body in bodies if body != GROUND] for bodies in moving],
+        "carried": [sorted(bricks - {-1}) for bricks in moving],
         "edges": np.column_stack([network.edge_nodes, network.edge_since]).tolist(),
         "grounds": [
             {"at": _rounded(ground.anchor), "brick": ground.brick} for ground in scene.grounds

@@ -33,7 +33,7 @@ def parse_grips(text: str) -> tuple[Any, Any]:
         try:
             numbers = [] if word in ("", "rigid") else [float(one) for one in word.split("x")]
         except ValueError:
-            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5"
+            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5 (N/m)"
             raise SceneError(f"{where}: {said}") from None
         found.append(None if not numbers else numbers[0] if len(numbers) == 1 else tuple(numbers))
     return found[0], found[1]
@@ -48,7 +48,7 @@ def parse_props(text: str, up: Vector, every: Callable[..., Any]) -> tuple[Prop,
     props, common, where = list[Prop](), dict[str, Any](), f"props {short(text)[1:-1]}"
     for word in map(str.strip, text.split(",")):
         place, _, stiffness = word.partition(":")
-        known = dict.fromkeys(("stiffness", "capacity"), (float, "a number"))
+        known = {"stiffness": (float, "a number of N/m"), "capacity": (float, "a number of N")}
         own = in_words(where, [f"stiffness={stiffness}"], known) if stiffness else {}
         if word.startswith("capacity="):
             common |= in_words(where, [word], known)
@@ -93,7 +93,7 @@ def parse_durations(
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys(NAMES, (float, f"a number, as {EXAMPLE}"))
+        known = dict.fromkeys(NAMES, (float, f"a number of s, as {EXAMPLE}"))
         said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):
             before = out[index]

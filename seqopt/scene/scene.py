@@ -34,7 +34,7 @@ from seqopt.work.progress import Tell
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-nx = Later("networkx")  # 120 ms, where connectivity is asked
+nx = Later("networkx")  # 90 ms, of what needs a scene without its network
 WORDS = Later("seqopt.scene._words")  # where words are given
 
 _Part = TypeVar("_Part")

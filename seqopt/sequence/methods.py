@@ -127,9 +127,9 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
 
 def lies_along(network: Network) -> frozenset[int]:
     """Return the names of bricks along the structure: joints meet both of their inner nodes."""
-    half = network.edge_kind == PartKind.JOINT.value
-    along = np.isin(network.inner, network.edge_nodes[half, 0]).all(axis=1)
-    return frozenset(network.scene.placed[i].name for i in np.flatnonzero(along).tolist())
+    edges = network.graph.edges.data()
+    met = {node for node, _, data in edges if data["kind"] is PartKind.JOINT}
+    return frozenset(brick.name for brick in network.scene.placed if met.issuperset(brick.nodes))
 
 
 def _begins_elsewhere(network: Network) -> frozenset[int]:

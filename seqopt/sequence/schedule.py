@@ -16,20 +16,19 @@ from numbers import Integral
 from operator import itemgetter
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
+import networkx as nx
 import numpy as np
 
-from seqopt._registry import Later, Shown, display
+from seqopt._registry import Shown, display
 from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import ProblemError, StepError, did_you_mean
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-nx = Later("networkx")  # 120 ms, where connectivity is asked
 
 _RULE = re.compile(r"near:([0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
@@ -298,14 +297,16 @@ def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:
     """Return the bricks of every part of a partial structure without joints to a ground end."""
     springs, placed = network.springs, network.scene.placed
     ties = springs.stiffness.any(axis=1)
-    at_once = ties & (springs.since == springs.bodies[:, 1] + 1)
-    if len(np.unique(springs.bodies[at_once, 1])) == len(placed):  # each to what stood before
+    at_once = ties & (springs.since == springs.bodies[:, 1] + 1) & (springs.since <= bricks)
+    if len(np.unique(springs.bodies[at_once, 1])) == bricks:  # each to what stood before
         return ()
-    graph = nx.Graph()
-    graph.add_nodes_from([*range(bricks), GROUND])
-    graph.add_edges_from(springs.bodies[ties & (springs.since <= bricks)].tolist())
-    parts = nx.connected_components(graph)
-    return tuple(frozenset(placed[i].name for i in part) for part in parts if GROUND not in part)
+    graph = network.partial(bricks, {*np.flatnonzero(~ties | (springs.since > bricks)).tolist()})
+    of_node = dict(graph.nodes.data("brick"))
+    found = []
+    for part in nx.weakly_connected_components(graph):
+        if not any(graph.nodes[node]["kind"] is PartKind.BASE for node in part):
+            found.append(sorted({of_node[node] for node in part} - {-1}))
+    return tuple(frozenset(placed[i].name for i in part) for part in sorted(found))
 
 
 def check_support(

@@ -192,7 +192,7 @@ def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
     assert steps[0].number == 5
     for command in ("analyze", "assess"):
         plan = str(rest / "plan.csv")
-        status, said, _ = run(capsys, command, scene, "--plan", plan)
+        status, said, _ = run(capsys, command, scene, "--plan", plan, "--quiet")
         assert status == 0
         mortar = "dry," * (command == "assess")
         assert said.splitlines()[1].startswith(f"{mortar}5,")

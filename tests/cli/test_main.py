@@ -102,9 +102,13 @@ def test_assess_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
     plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
     for strength, verdict in (("600", "does not stand"), ("640", "stands")):
         mortar = ("--mortar", f"bond={strength}")
-        status, out, _ = run(capsys, "assess", "--plan", str(plan), *mortar, "--margins", "bond")
+        words = ("assess", "--plan", str(plan), *mortar, "--margins", "bond")
+        status, out, _ = run(capsys, *words, "--quiet")
         assert status == (verdict != "stands")
         last = pd.read_csv(io.StringIO(out)).iloc[-1]
+        printed = run(capsys, *words)[1].splitlines()
+        assert printed[0].startswith(f"with bond={strength}: 3 steps")
+        assert [line.split()[1] for line in printed[3:6]] == ["1", "2", "3"]
         assert last["verdict"] == verdict
         assert 600 < last["bond_needed_Pa"] < 640
 

@@ -98,6 +98,9 @@ BAD = {
     # numbers and sizes
     "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",
     "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
+    "optimize ARCH --time-limit 5min": "not a positive number or zero; give a number of s",
+    "optimize ARCH --limit F_largest=300N": "'300N' is not a positive number; give a number of N",
+    "optimize ARCH --robots rob1 --aim minmx": "aim 'minmx' does not exist (did you mean minmax?)",
     "optimize ARCH --time-limit soon": "--time-limit: 'soon' is not a positive number or zero",
     "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
     "scene arch25 --grips=0": "stiffness is 0.0; give one number or three",

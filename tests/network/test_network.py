@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
+from unittest.mock import patch
 
 import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis.strategies import integers
 
 from experiments.harness.scenes import running_bond
+from seqopt.network import build
 from seqopt.network.build import build_network
 from seqopt.network.network import PartKind
+from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import islands
-from tests.strategies import arches
+from tests.strategies import arches, walls
 
 
 def test_edge_counts_of_the_study(engine25):
@@ -24,10 +29,46 @@ def test_edge_counts_of_the_study(engine25):
 
 
 def graph_of(net, bricks):
-    """Return a partial structure as a graph of its nodes, by index."""
+    """Return a partial structure as a graph of its nodes, by index; the arrays agree with it."""
     graph = nx.Graph(net.edge_nodes[: net.count_edges(bricks)].tolist())
     assert {*graph} == {*range(net.count_nodes(bricks))}
+    names = dict(enumerate(net.node_name))
+    assert nx.utils.graphs_equal(
+        nx.relabel_nodes(graph, names), nx.Graph(net.partial(bricks).edges)
+    )
     return graph
+
+
+@pytest.mark.parametrize("count", [6, 9, 30])
+def test_the_graph_of_a_chain_has_closed_counts(count):
+    graph = build_network(load_scene(f"chain:bricks={count}")).graph
+    nodes, edges = (
+        Counter(kind for *_, kind in part.data("kind")) for part in (graph.nodes, graph.edges)
+    )
+    inner, joint, base = PartKind
+    assert nodes == {inner: 2 * count, joint: count + 1, base: 2}
+    assert edges == {inner: count, joint: 2 * count, base: 2}
+    assert {s for _, s in graph.nodes.data("spring")} == {-1, *range(count + 1)}
+    with pytest.raises(nx.NetworkXError, match="Frozen graph"):
+        graph.add_edge(0, 1)
+
+
+@given(scene=walls() | arches(), seed=integers(0, 99))
+def test_no_array_depends_on_the_order_in_which_a_graph_is_made(scene, seed):
+    rng, made = np.random.default_rng(seed), build.double_cross
+
+    def shuffled(*given):
+        graph, out = made(*given), nx.DiGraph()
+        for add, parts in ((out.add_node, graph.nodes), (out.add_edge, graph.edges)):
+            listed = list(parts.data())
+            for i in rng.permutation(len(listed)):
+                *names, data = listed[i]
+                add(*names, **{key: data[key] for key in rng.permutation([*data])})
+        return out
+
+    with patch.object(build, "double_cross", shuffled):
+        other = build_network(scene)
+    assert other == build_network(scene)
 
 
 def test_parts_of_a_partial_structure_come_first(engine25, arch25):

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any
 
+import pandas as pd
+
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.inputs import read_steps
@@ -32,6 +34,7 @@ from seqopt.work.progress import Tell, with_progress
 MAP = Later("seqopt.report._failures")  # 24 ms, of pages
 FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written
 STEEPEST = 45.0  # degrees
+COUNTS = ("jammed", "almost_solved", "stalled", "unproven")  # columns that are mostly zero
 
 
 def run(
@@ -58,7 +61,8 @@ def run(
         With ``map``: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, with commas
         between them (default: {default}).
     out : pathlib.Path, optional
-        CSV file to write (default: standard output); with ``map`` a folder.
+        CSV file to write (default: the table is printed, with ``quiet`` as CSV); with ``map`` a
+        folder.
 
     Examples
     --------
@@ -107,6 +111,11 @@ def _answer(
         failures = (f"seqopt: solver failed: {unsure}: undecided; this says nothing about them",)
         status = Status.FAILED
     said = outputs.put_table(output.path, rows, "\n".join(lines) + ";")
+    if output.path is None:
+        table = pd.DataFrame(rows).dropna(axis=1, how="all")
+        told = [name for name in table if name not in COUNTS or table[name].any()]
+        listed = table[told].to_string(index=False, na_rep="", float_format="{:.4g}".format)
+        said["text"] = "\n".join([*lines, "", listed, "", "--out FILE or --quiet: the same as CSV"])
     return Answer(facts, **said, failures=failures, status=status)
 
 

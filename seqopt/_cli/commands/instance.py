@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
-from math import inf
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,20 +15,18 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import find_formulation
+from seqopt.graph.instance import Instance
 from seqopt.instances._files import WRITERS, save_instance
-from seqopt.instances.compiled import compile_instance
+from seqopt.instances.compiled import instance
 from seqopt.judge.arithmetic import first_stage
-from seqopt.work.progress import Clock, Tell
-from seqopt.workflow import optimize, pose_build
+from seqopt.work.progress import Tell
 
 OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")
 
 
 def run(
-    asked: Annotated[Call, ("call", optimize)],
+    asked: Annotated[Call, ("call", instance)],
     *,
-    below: Annotated[float, ("value", "VALUE")] = inf,
     out: File = None,
     made_by: Sequence[str] = (),
     progress: Tell,
@@ -40,9 +38,6 @@ def run(
 
     Parameters
     ----------
-    below : float, optional
-        Leave out states of which the first aim, a worst step, takes more; plans that are better
-        than this stay.
     out : pathlib.Path, optional
         File to write: .npz (the instance) or .mps (a program); without an end a folder with both.
     made_by : sequence of str
@@ -54,19 +49,14 @@ def run(
     $ seqopt instance arch25 --budget travel=0.8 --out arch25.mps
     $ seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
     """
-    words, formulation = asked.words, asked.words.get("formulation")
+    words = asked.words
     if out and out.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {out}: give a name with {', '.join(WRITERS)}, or a folder")
     mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=True)
-    clock = Clock(words.get("time_limit", inf))
-    with clock.needed("posing the problem"):
-        problem = pose_build(asked.values(mortar=mortar, progress=progress))
-    progress("computing all that arcs take")
-    to = out or Path(re.sub(r"\W+", "-", problem.scene.name).strip("-") + ".npz")
-    aim = None if formulation is None else find_formulation(formulation).aim
-    facts = {"made_by": OUTPUT.sub("", shlex.join(["seqopt", *made_by]))}
-    with clock.needed("writing down the graph"):
-        found = compile_instance(problem, name=to.stem, aim=aim, below=below, facts=facts)
+    found: Instance = asked(mortar=mortar, progress=progress)
+    to = out or Path(re.sub(r"\W+", "-", found.name).strip("-") + ".npz")
+    made = {"made_by": OUTPUT.sub("", shlex.join(["seqopt", *made_by]))}
+    found = replace(found, name=to.stem, facts={**found.facts, **made})
     progress("writing the instance")
     Output(out, words.get("scene"), words.get("schedule")).keep_apart(to)
     save_instance(found, to)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import isfinite
-from pathlib import Path
+from typing import Annotated
 
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.signatures import Call
 from seqopt.errors import SolverError
 from seqopt.graph.instance import Instance
 from seqopt.instances._files import read_instance
@@ -14,34 +15,23 @@ from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 
-def run(instance: Path, solution: Path, *, bound: Path | None = None) -> Answer:
+def run(asked: Annotated[Call, ("call", judge_instance)]) -> Answer:
     """Check a path through an instance, and bounds on all others, with arithmetic alone.
 
     No scene is needed. What is claimed without proof is called claimed. The exit status is 1 if
     something does not hold.
-
-    Parameters
-    ----------
-    instance : pathlib.Path
-        File of seqopt instance.
-    solution : pathlib.Path
-        File with the nodes of a path, or after the word arcs its arcs, after acts its acts: text,
-        CSV or JSON.
-    bound : pathlib.Path, optional
-        JSON file with a bound for every goal and what proves it: multipliers, weights, shares,
-        labels (default: the judge looks for a proof itself).
 
     Examples
     --------
     $ seqopt judge arch25.npz mine.txt
     $ seqopt judge arch25.npz mine.json --bound claims.json
     """
-    graph = read_instance(instance)
+    graph = read_instance(asked.words["instance"])
     try:
-        proof = judge_instance(graph, solution, () if bound is None else bound)
+        proof: Certificate = asked(instance=graph)
     except SolverError as error:
         facts = {**graph.facts_of(), "holds": False, "why": str(error)}
-        failed = (f"seqopt: {solution}: {error}",)
+        failed = (f"seqopt: {asked.words['solution']}: {error}",)
         return Answer(facts, "it does not hold", failures=failed, status=Status.DOES_NOT_HOLD)
     names = [goal.name for goal in graph.goals]
     facts = {
