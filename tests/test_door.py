@@ -41,7 +41,7 @@ SELDOM = (
     *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._orders"),
-    *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
+    *("seqopt.plan._answers", "seqopt.judge._proof", "seqopt.scene.library"),
     "seqopt.sequence._rule_space",
 )
 FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]

@@ -20,7 +20,7 @@ from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
 from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import States
 from seqopt.instances.compiled import _pruned
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim
 from seqopt.sequence.schedule import Schedule
 

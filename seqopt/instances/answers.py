@@ -13,7 +13,7 @@ import numpy as np
 from seqopt._files import parse_json, read_text
 from seqopt.errors import ProblemError
 from seqopt.graph.instance import Instance
-from seqopt.judge.arithmetic import Answer, Claim, judge_path
+from seqopt.judge._paths import Answer, Claim, judge_path
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import short
 

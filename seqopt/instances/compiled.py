@@ -18,8 +18,7 @@ from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Ca
 from seqopt.graph.paths import _on_paths, contracted
 from seqopt.graph.states.explored import build_space
 from seqopt.graph.states.states import States
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import without_shares
+from seqopt.plan.solve import graph_of, without_shares
 from seqopt.problem.problem import Aim, Problem
 
 

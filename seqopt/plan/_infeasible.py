@@ -32,8 +32,8 @@ from seqopt.graph.states.explored import (
     with_margin,
 )
 from seqopt.graph.states.states import States
-from seqopt.judge._bounds import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
+from seqopt.judge.arithmetic import is_kept, least_within
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.filters import IGNORED, STANDING
@@ -53,7 +53,7 @@ def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
     counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
     for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
         own = instance.graph, nothing, _limited(some), 1.0
-        if least_within(*own, laid_down=instance.is_layered)[0] >= PROVEN:
+        if least_within(*own, labels=instance.is_layered) >= PROVEN:
             return some
     return ()
 
@@ -75,8 +75,8 @@ def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
     ``name``, ``exact``: of the formulation that claims infeasibility, as of `claimed`.
     """
     found = smallest_conflict(instance)
-    limited, laid_down = _limited(instance.caps), instance.is_layered
-    if not found and is_kept(instance.graph, limited, laid_down=laid_down):
+    limited, labels = _limited(instance.caps), instance.is_layered
+    if not found and is_kept(instance.graph, limited, labels=labels):
         return SolverError(
             f"formulation {name} says that no choice is within all budgets, and some are"
         )

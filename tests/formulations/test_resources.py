@@ -13,7 +13,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.states.explored import explore
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem import Resource
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES

@@ -16,8 +16,7 @@ from seqopt.graph._labels import CappedSums, LabelSearch, LateError, Sweep, wide
 from seqopt.graph.formulation import Watch
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.graph.states.walk import _branches
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
 from seqopt.study.published import EQUATIONS

@@ -18,7 +18,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import compile_instance
-from seqopt.judge.arithmetic import first_stage
+from seqopt.judge._paths import first_stage
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import optimize, pose_build
 
