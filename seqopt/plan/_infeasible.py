@@ -70,10 +70,7 @@ def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFou
 
 
 def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible.
-
-    ``name``, ``exact``: of the formulation that claims infeasibility, as of `claimed`.
-    """
+    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible."""
     found = smallest_conflict(instance)
     limited, labels = _limited(instance.caps), instance.is_layered
     if not found and is_kept(instance.graph, limited, labels=labels):
@@ -105,10 +102,9 @@ def confirmed(
 ) -> SeqoptError:
     """Return the error that explains why a problem is infeasible, after proving that it is.
 
-    ``name``, ``exact``: of the formulation that claims so, as of `claimed`; ``seconds``: limit of
-    proof and search for remedies, s, after which the error is called claimed; ``explain``: whether
-    remedies are sought. Result: a `SolverError` if a plan is feasible, a `NothingFoundError` if
-    the stability of some states is undecided.
+    ``name``, ``exact``: as of `claimed`; ``seconds``: of proof and search for remedies, after which
+    the error is called claimed; ``explain``: whether remedies are sought. A `SolverError` if a plan
+    is feasible, a `NothingFoundError` if the stability of some states is undecided.
     """
     look, capped = Look(time.perf_counter() + seconds), problem.goals[len(problem.aims) :]
     own = (goal for goal in problem.aims if goal.of_criterion)  # whose values may be infinite
@@ -200,10 +196,7 @@ class Look:
         return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
     def least(self, problem: States, response: str) -> float:
-        """Return the least peak of a response over all plans, SI units; infinite if infeasible.
-
-        ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
-        """
+        """Return the least peak of a response, or ``bond``, over all plans; infinite if none is."""
         goals = (BUILT_IN.get(response) or worst(response),)
         found = self(replace(problem, goals=goals))
         return least_peak(found.graph().graph, 0) if found.whole else np.inf
@@ -342,10 +335,7 @@ NEWTONS = sorted({m * 10**k for k in range(4) for m in range(1, 1000)})  # in th
 
 
 def _payload(problem: States, look: Look, free: States | None) -> str:
-    """Return the least payload of all robots in words; ``free``: without payloads, if one may be.
-
-    Then it is the least peak of forces, or what the heaviest brick asks of any robot of the team.
-    """
+    """Return the least payload of all robots in words; ``free``: without any, if one may be."""
     if free is None:
         least: float = min(robot.payload for robot in problem.network.scene.robots)
         first, end = (bisect_left(NEWTONS, each) for each in (least, NEWTONS[-1]))
