@@ -18,12 +18,12 @@ from seqopt.judge.arithmetic import (
     Labelled,
     Stage,
     TwinBook,
+    _peak_bound,
+    _sum_bound,
     least_within,
     limit_below,
-    peak_bound,
-    sum_bound,
 )
-from seqopt.judge.certificate import TOLERANCE, Certificate, path_twin
+from seqopt.judge.certificate import TOLERANCE, Certificate, _path_twin
 from seqopt.problem.resources import _first_fault
 
 
@@ -68,7 +68,7 @@ def judge_path(instance: Instance, answer: Answer) -> Certificate:
     arcs, acts = _walked(instance, answer)
     sums, ends = instance.amounts[arcs].sum(axis=0), 0.0
     if instance.timed is not None and instance.asks_time:
-        twin = path_twin()
+        twin = _path_twin()
         ends = np.nan if twin is None else twin.path_value(instance.timed, arcs, acts)
     values, spent = list[float](), dict[str, float]()
     for goal in instance.goals:
@@ -191,13 +191,13 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
     if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
         return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
-        return peak_bound(stage, goal, claim.value if claim.prices else None, prices)
+        return _peak_bound(stage, goal, claim.value if claim.prices else None, prices)
     if goal.kind == TIME:
-        twin = path_twin()
+        twin = _path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, prices)
     costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
     if goal.kind == TAIL or not stage.limited:
-        return sum_bound(stage, costs, prices)
+        return _sum_bound(stage, costs, prices)
     labels = instance.is_layered
     return least_within(stage.graph, costs, stage.caps(), value, prices, labels=labels)
 

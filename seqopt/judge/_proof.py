@@ -42,7 +42,7 @@ from seqopt.judge.arithmetic import (
     is_beyond,
     limit_below,
 )
-from seqopt.judge.certificate import twin_of
+from seqopt.judge.certificate import _twin_of
 from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.resources import StepArrays
@@ -289,7 +289,7 @@ class Proof:
         """
         evaluator = self.evaluator
         goals, closed = evaluator.problem.goals, not self._leaves_room(values[1:], least[1:])
-        twin = twin_of(goals[1]) if len(goals) > 1 else None
+        twin = _twin_of(goals[1]) if len(goals) > 1 else None
         counts = twin is not None and twin.to_go is not None and not evaluator.demands(())
         if not goals[0].is_peak or evaluator.margins or not (closed or counts):
             return None

@@ -29,7 +29,7 @@ from seqopt.judge._proof import Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._states import StateEvaluator, depends_on_robots, largest_load, props_that_hold
 from seqopt.judge.arithmetic import limit_below
-from seqopt.judge.certificate import TOLERANCE, Basis, Certificate, exceeds, own_values, twin_of
+from seqopt.judge.certificate import TOLERANCE, Basis, Certificate, _own_values, _twin_of, exceeds
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
 from seqopt.problem.resources import StepArrays, _first_fault
@@ -161,7 +161,7 @@ def _closed(values: Sequence[float], bounds: Sequence[float]) -> Bounds:
 
 def _has_twins(problem: States) -> bool:
     """Return whether goals of states and moves, filters and resources all have twins."""
-    goals = (twin_of(goal) is not None or goal.in_time for goal in problem.goals)
+    goals = (_twin_of(goal) is not None or goal.in_time for goal in problem.goals)
     filters = all(each.twin is not None for each in problem.filters)
     return all(goals) and filters and all(each.twin is not None for each in problem.paths)
 
@@ -277,7 +277,7 @@ Levels = Sequence[tuple[Ints, StateArrays]]  # rows of steps, and the states tha
 
 def _value(goal: Amount, levels: Levels, moves: MoveArrays) -> float:
     """Return the value of an amount of states or moves of a plan, by its twin if it has one."""
-    values = own_values(goal)
+    values = _own_values(goal)
     assert values is not None  # it is of no whole path
     every = [values(moves)] if goal.moves else [values(states) for _, states in levels]
     costs = np.concatenate([np.zeros(1), *every])

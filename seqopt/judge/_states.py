@@ -16,7 +16,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import strictly_below, tied
 from seqopt.graph.states.states import States
 from seqopt.judge._rule_moves import Choices, RuleTables, ScheduleTables, Transitions
-from seqopt.judge.certificate import exceeds, own_values, twin_of
+from seqopt.judge.certificate import _own_values, _twin_of, exceeds
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets
@@ -106,7 +106,7 @@ class StateEvaluator:
         self.numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[team]
         self._standing = dict[Standing, tuple[StandingSets, ...]]()
-        twins = (twin_of(goal) for goal in problem.goals if not goal.is_peak)
+        twins = (_twin_of(goal) for goal in problem.goals if not goal.is_peak)
         self._to_go = next((twin.to_go for twin in twins if twin and twin.to_go), None)
         self._levels = LevelTables(self)
         self._models = 0
@@ -127,7 +127,7 @@ class StateEvaluator:
         if end is not None and tables.bricks_at(tables.last):
             last = self.valued(tables.last, end, Filter())[0][0]
         out = np.where([goal.is_peak for goal in goals], last, -np.inf)
-        for k, twin in enumerate(map(twin_of, goals)):
+        for k, twin in enumerate(map(_twin_of, goals)):
             if twin is not None and twin.to_go is not None:
                 out[k] = twin.to_go(tables, tables.first, tables.start())[0]
         return tuple(out.tolist())
@@ -293,7 +293,7 @@ class StateEvaluator:
         seen, values = seen._replace(possible=fit), np.zeros((len(grips), len(problem.goals)))
         for k, goal in enumerate(problem.goals):  # of no moves; others `LevelTables` writes
             if goal.states is not None and k not in self._levels.columns:
-                value = own_values(goal)
+                value = _own_values(goal)
                 values[:, k] = 0.0 if value is None else value(seen)
         return values, forces, fit & np.isfinite(values).all(axis=1)
 
@@ -310,7 +310,7 @@ class StateEvaluator:
         out = values.copy()
         moves = MoveArrays(np.full(len(found.distance), float(found.regrip)), found.distance)
         for k, goal in enumerate(self.problem.goals):
-            if goal.moves is not None and (own := own_values(goal)) is not None:
+            if goal.moves is not None and (own := _own_values(goal)) is not None:
                 out[:, k] = own(moves)
         return out
 
@@ -436,7 +436,7 @@ class LevelTables:
             if goal.of_criterion and one.is_relative:
                 out[:, k] = _relative(one.criterion, found, choices)
             else:
-                value = own_values(goal)
+                value = _own_values(goal)
                 assert value is not None  # a goal of states has one
                 out[:, k] = value(seen)
         return out, ok

@@ -131,11 +131,11 @@ def budget_bounds(
             counts = f"{len(own)} where {len(stage.limited)} numbers belong"
             raise SolverError(f"there is no multiplier for every budget and goal: {counts}")
         if graph.peaks[k]:
-            out.append(peak_bound(stage, goal, claimed[k], own if is_given else None))
+            out.append(_peak_bound(stage, goal, claimed[k], own if is_given else None))
             stage = stage.after(goal, values[k])
             continue
         costs, limited = stage.graph.amounts[:, k], stage.caps(loose=True)
-        bound = sum_bound(stage, costs, own)
+        bound = _sum_bound(stage, costs, own)
         if claimed[k] > bound + ABOVE * abs(claimed[k]):  # labels may close what is left open
             own_bound = least_within(stage.graph, costs, limited, values[k], own, labels=True)
             bound = max(bound, own_bound)
@@ -144,7 +144,7 @@ def budget_bounds(
     return tuple(out)
 
 
-def sum_bound(stage: Stage, costs: Floats, prices: Sequence[float]) -> float:
+def _sum_bound(stage: Stage, costs: Floats, prices: Sequence[float]) -> float:
     """Return the Lagrangian bound of a sum of costs (m,), by multipliers of the caps (B,)."""
     graph, back = stage.graph, 0.0
     for price, (column, most) in zip(prices, stage.caps(), strict=True):
@@ -154,7 +154,7 @@ def sum_bound(stage: Stage, costs: Floats, prices: Sequence[float]) -> float:
     return least_sum(graph, costs) - back - ROUNDING * graph.states * abs(back)
 
 
-def peak_bound(
+def _peak_bound(
     stage: Stage, goal: _Target, claimed: float | None, prices: Sequence[float] | None
 ) -> float:
     """Return the lower bound of a worst amount: as claimed if no path is below it, or a cut.
@@ -168,7 +168,7 @@ def peak_bound(
         part = stage.below(goal, claimed)
         nothing = np.zeros(len(part.graph.source))
         if prices is not None:
-            return claimed if sum_bound(part, nothing, prices) > 0 else -np.inf
+            return claimed if _sum_bound(part, nothing, prices) > 0 else -np.inf
         if least_within(part.graph, nothing, part.caps(loose=True), 1.0, labels=True) >= 1.0:
             return claimed
     least = cut(graph, column, np.inf)[0]
@@ -232,7 +232,7 @@ def least_within(
     return value if value - bound <= case.slack else bound
 
 
-def is_kept(graph: Graph, limited: Sequence[tuple[int, float]], *, labels: bool) -> bool:
+def _is_kept(graph: Graph, limited: Sequence[tuple[int, float]], *, labels: bool) -> bool:
     """Return whether a path is found that keeps all caps; ``labels``: as of `least_within`."""
     case, none = _case(graph, np.zeros(len(graph.source)), limited, 1.0), np.zeros(len(limited))
     best = _best_multipliers(case, none)
@@ -356,7 +356,7 @@ class SumBook(Book):
 
     def beyond(self, state: Ints, values: Floats) -> Bools:
         """Compare the least sums of all paths with the limits."""
-        return is_beyond_limits(values + self._left[state], self._most, self._strict)
+        return _is_beyond_limits(values + self._left[state], self._most, self._strict)
 
 
 class TwinBook(Book):
@@ -378,7 +378,7 @@ class TwinBook(Book):
         return self._twin.ends(values)
 
 
-def is_beyond_limits(bounds: Floats, most: Floats, strict: Bools) -> Bools:
+def _is_beyond_limits(bounds: Floats, most: Floats, strict: Bools) -> Bools:
     """Return which rows of bounds (N, b) exceed a limit (b,), or attain it where it is strict."""
     slack = np.where(np.isfinite(most), 1e-12 * np.abs(most), 0.0)
     return np.asarray(np.where(strict, bounds >= most - slack, bounds > most).any(axis=1))

@@ -156,7 +156,7 @@ TWINS = {
 }
 
 
-def twin_of(amount: Amount) -> Twin | None:
+def _twin_of(amount: Amount) -> Twin | None:
     """Return the twin of an amount of states or moves; None if it has none, or is of paths."""
     if amount.name in TWINS:
         return TWINS[amount.name]
@@ -169,15 +169,15 @@ def twin_of(amount: Amount) -> Twin | None:
     return Twin(partial(amount.checked, amount.twin))
 
 
-def path_twin() -> PathTwin | None:
+def _path_twin() -> PathTwin | None:
     """Return the twin of makespans; None if no room offers one, so that they are claimed."""
     found: PathTwin | None = getattr(registered(Amount).get("makespan"), "twin", None)
     return found
 
 
-def own_values(amount: Amount) -> Callable[[Any], Floats] | None:
+def _own_values(amount: Amount) -> Callable[[Any], Floats] | None:
     """Return the judge's function of an amount, or its own where it has no twin; None of paths."""
-    twin = twin_of(amount)
+    twin = _twin_of(amount)
     if twin is not None:
         return twin.values
     return None if amount.in_time or amount.margins else amount.value

@@ -33,7 +33,7 @@ from seqopt.graph.states.explored import (
 )
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import Proof, TooManyPartsError
-from seqopt.judge.arithmetic import is_kept, least_within
+from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.filters import IGNORED, STANDING
@@ -73,7 +73,7 @@ def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
     """Return the error that names the caps in conflict; a `SolverError` if a path is feasible."""
     found = smallest_conflict(instance)
     limited, labels = _limited(instance.caps), instance.is_layered
-    if not found and is_kept(instance.graph, limited, labels=labels):
+    if not found and _is_kept(instance.graph, limited, labels=labels):
         return SolverError(
             f"formulation {name} says that no choice is within all budgets, and some are"
         )

@@ -16,7 +16,7 @@ from seqopt.graph.paths import _to_go
 from seqopt.judge._paths import Claim
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Book, Closed, Stage, is_beyond_limits, limit_below, sum_bound
+from seqopt.judge.arithmetic import Book, Closed, Stage, _is_beyond_limits, _sum_bound, limit_below
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
@@ -61,7 +61,7 @@ class Clock(Book):
         for multipliers, left in zip(self._multipliers, self._left, strict=True):
             bound = multipliers[0] * end + busy @ multipliers[1:] + left[state]
             ends = np.where(over, ends, np.maximum(ends, bound))
-        return is_beyond_limits(ends[:, None], *self._limit)
+        return _is_beyond_limits(ends[:, None], *self._limit)
 
     def counted(self, state: Ints, values: Floats) -> Floats:
         """Return labels with the readiness and ages that count.
@@ -210,7 +210,7 @@ def claimed_time(instance: Instance, stage: Stage, claim: Claim, prices: Sequenc
         if closed.is_proof((nodes, values)):
             return claim.value
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
-    bounds = [sum_bound(stage, timed.work[kept] @ own, prices) for own in shares]
+    bounds = [_sum_bound(stage, timed.work[kept] @ own, prices) for own in shares]
     return max(bounds) * (1 - 1e-12)
 
 
