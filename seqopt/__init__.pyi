@@ -15,7 +15,7 @@ from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.plan import Plan as Plan
-from seqopt.plan.pose import pose as pose
+from seqopt.plan.solve import pose as pose
 from seqopt.plan.solve import solve as solve
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit

@@ -28,7 +28,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.requirements import Filter, Limit
 from seqopt.responses import table

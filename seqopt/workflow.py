@@ -19,8 +19,7 @@ from seqopt.graph.formulation import Formulation, Run, as_formulation, find_form
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import default_formulation, pose
-from seqopt.plan.solve import _solve_run
+from seqopt.plan.solve import _solve_run, default_formulation, pose
 from seqopt.problem.amounts import parse_goals
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim

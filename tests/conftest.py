@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.plan.pose import pose
+from seqopt.plan.solve import pose
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study import EQUATIONS

@@ -41,7 +41,7 @@ SELDOM = (
     *("scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
     *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._spaces"),
-    *("seqopt.plan._states", "seqopt.judge._proof", "seqopt.scene.library"),
+    *("seqopt.plan._answers", "seqopt.judge._proof", "seqopt.scene.library"),
     "seqopt.sequence._space",
 )
 FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]

@@ -19,7 +19,7 @@ from seqopt.graph.graph import Graph, Rows, lexicographic
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
 from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim
 from seqopt.sequence.schedule import Schedule
 

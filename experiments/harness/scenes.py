@@ -10,8 +10,7 @@ import numpy as np
 from seqopt import ArchShape, Network, Robot, Scene, arch_scene, build_network, load_scene
 from seqopt.arrays import Ints
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.plan.pose import pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import pose, solve
 from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.library.wall import WallShape, wall

@@ -38,7 +38,7 @@ from experiments.harness.ranks import rank_of, windows
 from experiments.harness.results import drawn
 from seqopt import Scene, Schedule, build_network, load_scene, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.plan.pose import graph_of, pose
+from seqopt.plan.solve import graph_of, pose
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit

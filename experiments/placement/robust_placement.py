@@ -44,7 +44,7 @@ from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenario
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
 from seqopt.graph.states import States, over_scenarios
-from seqopt.plan.pose import graph_of, pose
+from seqopt.plan.solve import graph_of, pose
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, Problem, RobustAim, cvar
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled

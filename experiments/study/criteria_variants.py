@@ -25,7 +25,7 @@ from experiments.harness.ranks import rank_choice
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from seqopt import Problem, three_robot_loop
-from seqopt.plan.pose import graph_of, pose
+from seqopt.plan.solve import graph_of, pose
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled

@@ -90,7 +90,7 @@ def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan
     most = max(robot.arm.choices for robot in problem.scene.robots if robot.arm is not None)
     bounds = {}
     if plan.certificate is not None and plan.gap is not None:
-        bounds = plan.in_display_units(plan.certificate.bounds[: len(plan.goals)])
+        bounds = plan.graph.in_display_units(plan.certificate.bounds[: len(plan.goals)])
     if not first.unreached or recipe_of(problem.engine) is None:
         best = bool(bounds) and not first.unreached
         return replace(plan, arms=KeptPostures(first, most, most, bounds, best))
@@ -125,7 +125,7 @@ def _with_fewer(problem: Problem, plan: Plan, postures: int) -> Problem:
         problem,
         engine=engine_for(problem.engine, scene),
         moves=problem.moves.in_scene(scene),
-        criterion=plan._of_scene.criterion,
+        criterion=plan.states.criterion,
         scenarios=tuple(map(fewer, problem.scenarios)),
     )
 

@@ -31,8 +31,7 @@ from seqopt.graph.instance import (
 )
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import without_shares
+from seqopt.plan.solve import graph_of, without_shares
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Filter, Limit

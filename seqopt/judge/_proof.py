@@ -31,11 +31,18 @@ from seqopt.graph.graph import (
 )
 from seqopt.graph.instance import PEAK, SUM, TIME, _Target
 from seqopt.graph.states import States
-from seqopt.judge._bounds import Book, Closed, TwinBook, is_beyond, limit_below
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, places
-from seqopt.judge._twin import twin_of
-from seqopt.judge.arithmetic import Stage, budget_bounds, next_stage, only_below, sum_books
+from seqopt.judge.arithmetic import (
+    Book,
+    Closed,
+    Stage,
+    TwinBook,
+    budget_bounds,
+    is_beyond,
+    limit_below,
+)
+from seqopt.judge.certificate import _twin_of
 from seqopt.network.build import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.requirements import StepArrays
@@ -44,7 +51,6 @@ from seqopt.sequence.rules import _RuleBook
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
-BELOW = 1e-9  # by how much a plan must be better, over the size of the value
 
 
 class TooManyPartsError(ProblemError):
@@ -246,9 +252,9 @@ class Proof:
         """How many models the proof solved."""
         return sum(each.models for each in self._space.evaluators)
 
-    def rebuilt(self, asked: Filter, *, hinted: bool = True) -> Rebuilt:
+    def rebuilt(self, asked: Filter) -> Rebuilt:
         """Return the states that pass a filter."""
-        return Rebuilt(self._space, asked, self._hint if hinted else None)
+        return Rebuilt(self._space, asked, self._hint)
 
     def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return lexicographic lower bounds of the goals.
@@ -283,7 +289,7 @@ class Proof:
         """
         evaluator = self.evaluator
         goals, closed = evaluator.problem.goals, not self._leaves_room(values[1:], least[1:])
-        twin = twin_of(goals[1]) if len(goals) > 1 else None
+        twin = _twin_of(goals[1]) if len(goals) > 1 else None
         counts = twin is not None and twin.to_go is not None and not evaluator.demands(())
         if not goals[0].is_peak or evaluator.margins or not (closed or counts):
             return None
@@ -369,7 +375,7 @@ class Proof:
 
         Which are asked is of no account: without those that fall, no end may be reached.
         """
-        rebuilt = self.rebuilt(Filter(), hinted=False)
+        rebuilt = Rebuilt(self._space, Filter())
         graph = rebuilt.graph()
         known = np.zeros(graph.states, dtype=np.int64)
         known[0] = PASSES
@@ -384,7 +390,7 @@ class Proof:
 
     def _leaves_room(self, values: Sequence[float], bounds: Sequence[float]) -> bool:
         """Return whether bounds leave room for a better plan, in goals that are no margins."""
-        room = [not b >= v - BELOW * abs(v) for v, b in zip(values, bounds, strict=False)]
+        room = [not b >= limit_below(v) for v, b in zip(values, bounds, strict=False)]
         return any(room[self.evaluator.margins :])
 
 
@@ -430,9 +436,9 @@ class _LabelBounds:
         problem, values = self._evaluator.problem, self._values
         kinds = [TIME if g.in_time else PEAK if g.is_peak else SUM for g in problem.goals]
         goals = [_Target(problem.names[k], kind, (k,)) for k, kind in enumerate(kinds)]
-        aims, stage = len(problem.aims), Stage(graph, ())
+        aims, stage = len(problem.aims), Stage(graph)
         for goal, cap in zip(goals[aims:], problem.budgets, strict=True):
-            stage = next_stage(stage, goal, cap)
+            stage = stage.after(goal, cap)
         cures = self._timed is not None and self._timed.cures
         plain, proofs = not (problem.budgets or cures or problem.paths), iter(self._found.proofs)
         out = [*values[: self._evaluator.margins]]
@@ -445,7 +451,7 @@ class _LabelBounds:
             else:
                 proof = next(proofs, None)
                 bound = -np.inf if proof is None else self._by_labels(stage, goal, proof)
-                stage = next_stage(stage, goal, value)
+                stage = stage.after(goal, value)
             out.append(bound)
         return tuple(out)
 
@@ -455,8 +461,9 @@ class _LabelBounds:
         claimed = min(self._found.bound[k], self._values[k])
         if not np.isfinite(claimed):
             return -np.inf
-        graph = only_below(stage.graph, goal, claimed)
-        books, move, least = list[Book](), np.arange(len(graph.source)), -np.inf
+        below = stage.below(goal, claimed)
+        graph, books, least = below.graph, list[Book](), -np.inf
+        move = np.arange(len(graph.source))
         if self._timed is not None:
             if proof.prices.ndim != 2 or proof.prices.shape[1] != 1 + len(self._columns):
                 raise SolverError("there is no multiplier for every robot")
@@ -464,7 +471,7 @@ class _LabelBounds:
             most = limit_below(claimed) if of_time else stage.time
             clock, move = self._timed.clock(graph, prices, most, strict=of_time)
             books, least = [clock], min(clock.bound, claimed) if of_time else least
-        books += sum_books(stage._replace(graph=graph), goal, claimed, move)
+        books += below.books(goal, claimed, move)
         closed = Closed(graph, move, [*books, *self._twins(graph, move)])
         margins = self._values[: self._evaluator.margins]
 

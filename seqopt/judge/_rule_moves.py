@@ -8,7 +8,7 @@ were taken since the last brick, where that counts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from math import prod
 from typing import NamedTuple
 
@@ -85,6 +85,9 @@ class _Tables:
         self._at = np.array([[np.nan] * 3, *(scene.node_position(node) for node in nodes)])
         self._place = {node: place for place, node in enumerate(self.nodes.tolist())}
         self._postures = _posture_rules(scene, team)
+        self._shift = len(self.nodes) if parks else 0
+        base = len(self.nodes) + self._shift
+        self._weights = np.cumprod([1, *[base] * self.robots], dtype=np.int64)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -94,10 +97,8 @@ class _Tables:
 
     def codes(self, states: Ints) -> Ints:
         """Return a number for every state (n, c) that no other one of its level has, (n,)."""
-        shift = len(self.nodes) if self._parks else 0
-        weights = np.cumprod([1, *[len(self.nodes) + shift] * self.robots], dtype=np.int64)
-        weights = weights[: states.shape[1]]
-        return np.asarray(states @ weights + shift * weights[: self.robots].sum())
+        weights = self._weights[: states.shape[1]]
+        return np.asarray(states @ weights + self._shift * weights[: self.robots].sum())
 
     def in_order(self, states: Ints) -> Ints:
         """Sort the entries of robots that could change places in states (n, c); return these."""
@@ -144,6 +145,20 @@ class _Tables:
         return after
 
 
+class _Places(NamedTuple):
+    """Tables of a brick count.
+
+    ``reach``: by robot, the places that it may take; ``changes``: those at which it may place or
+    remove the newest brick; ``newest`` (r, p): whether it holds that brick there; ``loose``: places
+    of bricks that nothing ties to the ground, by part.
+    """
+
+    reach: list[list[int]]
+    changes: list[list[int]]
+    newest: Bools
+    loose: list[Bools]
+
+
 class RuleTables(_Tables):
     """A book of rules for many states at once; a level is a brick count."""
 
@@ -165,30 +180,27 @@ class RuleTables(_Tables):
         self._least = self._rules.fewest_grips(scene)
         self._propped = np.isin(self.nodes, [prop.node for prop in scene.props])  # by place
         self._limited = self._rules.regrips is not None
-        self._known: dict[int, tuple[list[list[int]], Bools, list[Bools]]] = {}
+        self._known: dict[int, _Places] = {}
 
-    def _newest(self, bricks: int) -> list[list[int]]:
-        """Return by robot the places at which it holds the newest brick."""
-        book = self._book
-        return [[self._place[n] for n in book.newest_nodes[r, bricks]] for r in self.team]
-
-    def _places(self, bricks: int) -> tuple[list[list[int]], Bools, list[Bools]]:
-        """Return cached tables of so many bricks.
-
-        The places that robots may take; by robot and place whether it holds the newest brick;
-        places of bricks that nothing ties to the ground.
-        """
+    def _places(self, bricks: int) -> _Places:
+        """Return cached tables of so many bricks."""
         if bricks not in self._known:
             book, scene = self._book, self._book.network.scene
-            reach = [[self._place[n] for n in book.takes[r, bricks]] for r in self.team]
+            reach, on = (
+                [[self._place[n] for n in nodes[r, bricks]] for r in self.team]
+                for nodes in (book.takes, book.newest_nodes)
+            )
             newest = np.zeros((self.robots, len(self.nodes)), dtype=bool)
-            for robot, own in enumerate(self._newest(bricks)):
+            for robot, own in enumerate(on):
                 newest[robot, own] = True
+            changes = [
+                p if book.places(r, bricks) else [] for r, p in zip(self.team, on, strict=True)
+            ]
             owners = [0, *(scene.brick_of_node[n].name for n in self.nodes[1:].tolist())]
             loose = [np.isin(owners, [*part]) for part in islands(book.network, bricks)]
             for part in loose:
                 part[0] = False
-            self._known[bricks] = reach, newest, loose
+            self._known[bricks] = _Places(reach, changes, newest, loose)
         return self._known[bricks]
 
     def start(self) -> Ints:
@@ -204,24 +216,26 @@ class RuleTables(_Tables):
         """Return how many bricks stand on a level."""
         return self._top - level if self._top else level
 
-    def successors(self, level: int, states: Ints) -> Iterator[Transitions]:
+    def successors(
+        self, level: int, states: Ints, kinds: Collection[StepKind] = tuple(StepKind)
+    ) -> Iterator[Transitions]:
         """Yield the successors of states (n, c) that the rules allow, by kind of step."""
         rows, bricks = np.arange(len(states)), self.bricks_at(level)
         # who stands there against the rules has begun to let go, one by one, and may only do that
         lets_go = level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE
         keeps = rows[self.keep(bricks, states)] if bricks else rows
-        if bricks:
+        if bricks and StepKind.REPOSITION in kinds:
             begins = self._rules.begin is not None and level == self.first and not lets_go
             able = rows if begins else keeps
             if self._limited:
                 able = able[states[able, -1] < self._rules.regrips]
-            yield from self._taken(level, states, able, self._places(bricks)[0], regrip=True)
+            yield from self._taken(level, states, able, self._places(bricks).reach, regrip=True)
+        if bricks and StepKind.RELEASE in kinds:
             yield from self._released(level, states, checked=not lets_go)
-        if level < self.last and self._top:
+        if level < self.last and self._top and StepKind.REMOVE in kinds:
             yield from self._removed(level, states, keeps)
-        elif level < self.last:
-            newest = zip(self.team, self._newest(bricks + 1), strict=True)
-            wanted = [own if self._book.places(robot, bricks + 1) else [] for robot, own in newest]
+        elif level < self.last and not self._top and StepKind.PLACE in kinds:
+            wanted = self._places(bricks + 1).changes
             yield from self._taken(level + 1, states, keeps, wanted, regrip=False)
 
     def _taken(
@@ -265,9 +279,7 @@ class RuleTables(_Tables):
         bricks = self.bricks_at(level)
         brick = (2 * bricks - 1, 2 * bricks)  # places of its nodes
         rows = keeps[np.isin(states[keeps, : self.robots], brick).sum(axis=1) == 1]
-        for robot, newest in enumerate(self._newest(bricks)):
-            if not self._book.places(self.team[robot], bricks):
-                continue
+        for robot, newest in enumerate(self._places(bricks).changes):
             source = rows[np.isin(states[rows, robot], newest)]
             after = self._let_go(states[source], robot)
             after[:, self.robots :] = 0
@@ -307,18 +319,20 @@ class RuleTables(_Tables):
 
     def _broken(self, bricks: int, states: Ints) -> dict[str, Bools]:
         """Return which states (n, c) break which rules, by what they say; the ending apart."""
-        grips = states[:, : self.robots].clip(min=0)
-        count = np.count_nonzero(grips, axis=1)
+        grips = np.maximum(states[:, : self.robots], 0)
+        count = (grips > 0).sum(axis=1)
         struck = (bricks == self._book.span[1]) & (count == 0)  # where nobody holds, props are
         props = self._propped[: 2 * bricks + 1]
         held = np.where(struck, 0, count + props.sum())
-        _, newest, loose = self._places(bricks)
+        known = self._places(bricks)
         fewer = f"{held.min(initial=self.robots)} grips, fewer than least_grips={self._least}"
         out = {fewer: held < self._least * (bricks > 1)}
         if self._rules.newest is not Newest.FREE:
-            on = newest[np.arange(self.robots), grips].any(axis=1) | (props[-2:].any() & ~struck)
+            on = known.newest[np.arange(self.robots), grips].any(axis=1) | (
+                props[-2:].any() & ~struck
+            )
             out[f"nobody holds the newest brick (newest={self._rules.newest.value})"] = ~on
-        for k, part in enumerate(loose):
+        for k, part in enumerate(known.loose):
             on = part[grips].any(axis=1) | ((part & self._propped).any() & ~struck)
             out[f"part {k + 1} that no joint ties to the ground is held by nobody"] = ~on
         return out
@@ -454,7 +468,7 @@ def check_free(
         wanted, regrip = tables.row(step.grips), step.kind is StepKind.REPOSITION
         found = [
             move.states[(move.states[:, : tables.robots] == wanted).all(axis=1)]
-            for move in tables.successors(level, state)
+            for move in tables.successors(level, state, (step.kind,))
             if (move.level, move.regrip) == (to, regrip) and tables.bricks_at(to) == step.bricks
         ]
         after = np.concatenate([state[:0], *found])[:1]

@@ -1,93 +1,52 @@
 """States that a better plan could pass: responses, limits and stability, computed anew.
 
-Nothing that a search keeps is believed; what this judge computed once for a grip set it keeps.
+Nothing that a search keeps is believed; what this judge computed once for a grip set it keeps. Some
+criteria depend on who holds, or rank the choices of a level. For these the judge lists the choices
+by its own table of holds, asks the engine of all of them, and counts ranks by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, KnownRows
 from seqopt.graph.graph import strictly_below, tied
 from seqopt.graph.states import States
-from seqopt.judge._candidates import LevelTables, depends_on_robots
-from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
-from seqopt.judge._step_checks import props_that_hold
-from seqopt.judge._twin import exceeds, own_values, twin_of
+from seqopt.judge._rule_moves import Choices, RuleTables, ScheduleTables, Transitions
+from seqopt.judge.certificate import _own_values, _twin_of, exceeds
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import Block, solve_sets
+from seqopt.responses.quantities import robot_response
+from seqopt.scene.parts import Prop
+from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import _RuleBook
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import Step
 from seqopt.stability.standing import Standing, StandingSets
 
 Tables: TypeAlias = RuleTables | ScheduleTables
 """What rules or a schedule allow, level by level."""
+Responses = Mapping[str, Floats]
+_Table = tuple[Ints, Floats, Bools]  # codes of choices, values of goals, and what keeps limits
 
 
-class Answers(NamedTuple):
-    """What the engine answers of grip sets.
-
-    ``values`` (S, g): of every goal; zero of one that is about moves or margins; ``forces`` (S, r):
-    of the grips, N; ``fit`` (S,): which hang together and are within all limits; ``models``: how
-    many were solved for them.
-    """
-
-    values: Floats
-    forces: Floats
-    fit: Bools
-    models: int
-
-
-def ask(problem: States, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
-    """Return the engine's responses to grip sets (S, r), nodes held.
-
-    ``most``: over scenarios, what the first goal takes more of in one is not asked of the next.
-    """
-    if not problem.each:
-        return _ask_engine(problem, bricks, grips)
-    out = np.zeros((len(grips), len(problem.goals)))
-    forces, fit, models = np.zeros(grips.shape), np.ones(len(grips), dtype=bool), 0
-    for number, each in enumerate(problem.each):
-        rows = np.flatnonzero(fit & (out[:, 0] <= most))
-        found = ask(each, bricks, grips[rows])
-        out[rows] = problem.joined(out[rows], found.values, number)
-        forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
-        models += found.models
-    return Answers(out, forces, fit, models)
-
-
-def _ask_engine(problem: States, bricks: int, grips: Ints) -> Answers:
+def _solve(problem: States, bricks: int, grips: Ints) -> Floats:
+    """Return the named responses of grip sets (S, r), and then the forces of their grips."""
     names = tuple(name for name in problem.named if name != LARGEST)
-    held = tuple(n for n, _ in props_that_hold(problem.network.scene, bricks, grips.shape[1]))
-    block = Block(bricks, grips, names, screen=False, props=held)
-    rows = solve_sets(problem.engine, block, problem.resources)
+    props = tuple(n for n, _ in props_that_hold(problem.network.scene, bricks, grips.shape[1]))
+    block = Block(bricks, grips, names, screen=False, props=props)
+    return solve_sets(problem.engine, block, problem.resources)
+
+
+def _by_name(problem: States, rows: Floats) -> tuple[dict[str, Floats], Floats]:
+    """Return responses by name and forces (S, r), of what `_solve` returned."""
+    names = [name for name in problem.named if name != LARGEST]
     found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
-    found[LARGEST] = forces.max(axis=1, initial=0.0)
-    fit = np.asarray(np.isfinite(rows).all(axis=1))
-    for limit in problem.limits:
-        fit &= ~exceeds(limit, found.get(limit.response, np.zeros(len(grips))))
-    free = ((0, 0), (0, len(problem.network.scene.robots) - grips.shape[1]))
-    nodes = problem.network.scene.grip_kinds.split(grips)[0]
-    nodes, borne = np.pad(nodes, free, constant_values=NONE), np.pad(forces, free)
-    most = np.full(borne.shape, np.inf)
-    seen = StateArrays(bricks, nodes, found, borne, most, fit, problem.criterion, grips)
-    for each in problem.filters:  # without a twin nothing is refused: a bound stays one
-        left = np.flatnonzero(fit)
-        if len(left):
-            fit[left] = ~each.refuted_again(seen.only(left))
-    seen = seen._replace(possible=fit)
-    elsewhere = depends_on_robots(problem)  # values of these are written by `LevelTables`
-    own = [
-        own_values(goal) if goal.states is not None and k not in elsewhere else None
-        for k, goal in enumerate(problem.goals)
-    ]
-    zeros = np.zeros(len(grips))  # of what is not about states
-    values = np.column_stack([zeros if value is None else value(seen) for value in own])
-    return Answers(values, forces, fit & np.isfinite(values).all(axis=1), len(grips))
+    return found | {LARGEST: forces.max(axis=1, initial=0.0)}, forces
 
 
 class Filter(NamedTuple):
@@ -147,7 +106,7 @@ class StateEvaluator:
         self.numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[team]
         self._standing = dict[Standing, tuple[StandingSets, ...]]()
-        twins = (twin_of(goal) for goal in problem.goals if not goal.is_peak)
+        twins = (_twin_of(goal) for goal in problem.goals if not goal.is_peak)
         self._to_go = next((twin.to_go for twin in twins if twin and twin.to_go), None)
         self._levels = LevelTables(self)
         self._models = 0
@@ -155,7 +114,7 @@ class StateEvaluator:
     @property
     def models(self) -> int:
         """How often the engine was asked of a grip set, in any scenario."""
-        return self._models + self._levels.models
+        return self._models + self._levels.rows.count
 
     def least(self) -> tuple[float, ...]:
         """Return lower bounds of goals, from the one end that builds have and from counted steps.
@@ -168,7 +127,7 @@ class StateEvaluator:
         if end is not None and tables.bricks_at(tables.last):
             last = self.valued(tables.last, end, Filter())[0][0]
         out = np.where([goal.is_peak for goal in goals], last, -np.inf)
-        for k, twin in enumerate(map(twin_of, goals)):
+        for k, twin in enumerate(map(_twin_of, goals)):
             if twin is not None and twin.to_go is not None:
                 out[k] = twin.to_go(tables, tables.first, tables.start())[0]
         return tuple(out.tolist())
@@ -291,18 +250,67 @@ class StateEvaluator:
             places = held[rows, held.shape[1] - grips :]
             codes = places @ len(self.numbers) ** np.arange(grips)
             _, first, again = np.unique(codes, return_index=True, return_inverse=True)
-            found = ask(self.problem, bricks, self.numbers[places[first]], below)
-            values[rows], fit[rows] = found.values[again], found.fit[again]
-            forces[rows, held.shape[1] - grips :] = found.forces[again]
-            self._models += found.models
+            found, borne, able = self._ask(bricks, self.numbers[places[first]], below)
+            values[rows], fit[rows] = found[again], able[again]
+            forces[rows, held.shape[1] - grips :] = borne[again]
         return values, forces, fit
+
+    def _ask(self, bricks: int, grips: Ints, most: float) -> tuple[Floats, Floats, Bools]:
+        """Return values (S, g), forces (S, r) and feasibility (S,) of grip sets by the engine.
+
+        ``most``: over scenarios, what the first goal takes more of in one is not asked of the next.
+        """
+        problem = self.problem
+        if not problem.each:
+            self._models += len(grips)
+            return self._ask_engine(problem, bricks, grips)
+        values = np.zeros((len(grips), len(problem.goals)))
+        forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+        for number, each in enumerate(problem.each):
+            rows = np.flatnonzero(fit & (values[:, 0] <= most))
+            own, borne, fit[rows] = self._ask_engine(each, bricks, grips[rows])
+            values[rows] = problem.joined(values[rows], own, number)
+            forces[rows] = np.maximum(forces[rows], borne)
+            self._models += len(rows)
+        return values, forces, fit
+
+    def _ask_engine(
+        self, problem: States, bricks: int, grips: Ints
+    ) -> tuple[Floats, Floats, Bools]:
+        rows, scene = _solve(problem, bricks, grips), problem.network.scene
+        found, forces = _by_name(problem, rows)
+        fit = np.asarray(np.isfinite(rows).all(axis=1))
+        for limit in problem.limits:
+            fit &= ~exceeds(limit, found.get(limit.response, np.zeros(len(grips))))
+        free = ((0, 0), (0, len(scene.robots) - grips.shape[1]))
+        nodes = np.pad(scene.grip_kinds.split(grips)[0], free, constant_values=NONE)
+        borne, most = np.pad(forces, free), np.full(nodes.shape, np.inf)
+        seen = StateArrays(bricks, nodes, found, borne, most, fit, problem.criterion, grips)
+        for each in problem.filters:  # without a twin nothing is refused: a bound stays one
+            left = np.flatnonzero(fit)
+            if len(left):
+                fit[left] = ~each.refuted_again(seen.only(left))
+        seen, values = seen._replace(possible=fit), np.zeros((len(grips), len(problem.goals)))
+        for k, goal in enumerate(problem.goals):  # of no moves; others `LevelTables` writes
+            if goal.states is not None and k not in self._levels.columns:
+                value = _own_values(goal)
+                values[:, k] = 0.0 if value is None else value(seen)
+        return values, forces, fit & np.isfinite(values).all(axis=1)
+
+    def of_steps(self, steps: Sequence[Step]) -> Floats:
+        """Return values (n, g) of goals that depend on other choices, a row for every step."""
+        out = np.zeros((len(steps), len(self.problem.goals)))
+        for k, step in enumerate(steps):
+            row = self.tables.row(step.grips)
+            self._levels.fill(k + 1, row, out[k : k + 1], np.ones(1, dtype=bool))
+        return out
 
     def amounts(self, values: Floats, found: Transitions) -> Floats:
         """Return the values (m, g) of goals of moves to states with such values."""
         out = values.copy()
         moves = MoveArrays(np.full(len(found.distance), float(found.regrip)), found.distance)
         for k, goal in enumerate(self.problem.goals):
-            if goal.moves is not None and (own := own_values(goal)) is not None:
+            if goal.moves is not None and (own := _own_values(goal)) is not None:
                 out[:, k] = own(moves)
         return out
 
@@ -343,3 +351,156 @@ def interchangeable(
         key = (book.reached[r, last], nodes, may, most[r], grip, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def props_that_hold(scene: Scene, bricks: int, robots: int) -> list[tuple[int, Prop]]:
+    """Return props by the numbers of their grips, with so many bricks and robots that hold."""
+    if not robots and bricks >= len(scene.build_order):
+        return []
+    kinds, first, out = scene.grip_kinds, len(scene.robots), []
+    stand = {node for brick in scene.placed[:bricks] for node in brick.nodes}
+    for i, prop in enumerate(scene.props):
+        if prop.node in stand:
+            kind = int(kinds.of_robot[first + i]) if len(kinds.turns) > 1 else 0
+            out.append((prop.node + kinds.span * kind, prop))
+    return out
+
+
+def depends_on_robots(problem: States) -> list[int]:
+    """Return the columns of goals that depend on who holds, or on other candidates."""
+    beside = problem.asked - {*problem.named}
+    return [
+        k
+        for k, goal in enumerate(problem.goals)
+        if (goal.of_criterion and problem.by_robot) or beside & {*goal.responses}
+    ]
+
+
+class LevelTables:
+    """Values of goals, and limits on who moves, for all choices of a level; each level once."""
+
+    def __init__(self, evaluator: StateEvaluator) -> None:
+        self._evaluator, problem = evaluator, evaluator.problem
+        self.columns = depends_on_robots(problem)
+        self.is_needed = bool(self.columns or any(e.response == "F_move" for e in problem.limits))
+        others = [k for k, g in enumerate(problem.goals) if g.states and k not in self.columns]
+        beside = [*others, *problem.filters, *(e for e in problem.limits if e.response != "F_move")]
+        self.is_enough = self.is_needed and not beside and np.isinf(evaluator.most).all()
+        engines = tuple(one.engine for one in problem.each or (problem,))
+        key = "tables", engines, problem.goals, problem.weights, problem.limits
+        self._known: dict[int, _Table] = problem.judged.setdefault(key, {})
+        self.rows: KnownRows = problem.judged.setdefault("rows", KnownRows())
+
+    def fill(self, level: int, states: Ints, values: Floats, ok: Bools) -> None:
+        """Write the values (n, g) of these goals, and which states (n,) keep the limits."""
+        if not self.is_needed or not len(states):
+            return
+        if level not in self._known:
+            self._known[level] = self._table(level)
+        codes, known, kept = self._known[level]
+        if not len(codes):
+            ok[:] = False
+            return
+        own = self._evaluator.tables.codes(states.clip(min=0))
+        at = np.searchsorted(codes, own).clip(max=len(codes) - 1)
+        values[:, self.columns] = known[at]
+        ok &= kept[at] & (codes[at] == own)  # a hint may name what is no choice
+
+    def _table(self, level: int) -> _Table:
+        """Return codes of the choices of a level, ascending, values of goals, and what is kept."""
+        problem, tables = self._evaluator.problem, self._evaluator.tables
+        choices = tables.choices(level)
+        out = np.zeros((len(choices.states), len(problem.goals)))
+        ok = np.ones(len(choices.states), dtype=bool)
+        for number, one in enumerate(problem.each or (problem,)):
+            own, kept = self._values(one, level, choices)
+            out, ok = problem.joined(out, own, number), ok & kept
+        codes = tables.codes(choices.states)
+        order = np.argsort(codes)
+        return codes[order], out[order][:, self.columns], ok[order]
+
+    def _values(self, one: States, level: int, choices: Choices) -> tuple[Floats, Bools]:
+        """Return values (n, g) of choices in one scenario, and which keep limits on who moves."""
+        found = self._responses(one, level, choices)
+        fit = np.ones(len(choices.states), dtype=bool)
+        for name in one.named:
+            fit &= np.isfinite(found[name])
+        ok = np.ones(len(choices.states), dtype=bool)
+        for limit in (each for each in one.limits if each.response == "F_move"):
+            ok &= ~exceeds(limit, found["F_move"])
+        out, none = np.zeros((len(ok), len(one.goals))), np.zeros((len(ok), 0))
+        held, rows = choices.states[:, :0], choices.states
+        seen = StateArrays(choices.bricks, held, found, none, none, fit, one.criterion, rows)
+        for k in self.columns:
+            goal = one.goals[k]
+            if goal.of_criterion and one.is_relative:
+                out[:, k] = _relative(one.criterion, found, choices)
+            else:
+                value = _own_values(goal)
+                assert value is not None  # a goal of states has one
+                out[:, k] = value(seen)
+        return out, ok
+
+    def _responses(self, one: States, level: int, choices: Choices) -> dict[str, Floats]:
+        """Return responses (n,) of choices by name, forces of robots among them; NaN of none."""
+        holding, numbers = self._evaluator.grips(choices.states)
+        order, bricks, count = np.argsort(numbers, axis=1), choices.bricks, numbers.shape[1]
+        grips = np.take_along_axis(numbers, order, axis=1)
+        codes = grips @ (1 + self._evaluator.numbers.max()) ** np.arange(count)
+        key = one.engine, bricks, count, tuple(one.named)
+        rows = self.rows.of(key, codes, lambda new: _solve(one, bricks, grips[new]))
+        found, sorted_forces = _by_name(one, rows)
+        forces = np.zeros(grips.shape)
+        np.put_along_axis(forces, order, sorted_forces, axis=1)
+        robots, none = one.network.scene.robots, np.full(len(grips), np.nan)
+        by_robot = dict.fromkeys(range(len(robots)), none)
+        by_robot |= zip(holding, forces.T, strict=True)
+        moving = none if choices.moves == () else by_robot[choices.moves[-1]]
+        own = {robot_response(robots[r].name): force for r, force in by_robot.items()}
+        return {**found, **own, "F_move": moving}
+
+
+def _relative(criterion: Any, found: Responses, choices: Choices) -> Floats:
+    """Return costs (n,) among the choices of a level; zero where no grip is open."""
+    if not choices.moves:
+        return np.zeros(len(choices.states))
+    weights = criterion.settings.get("weights", {}).get("from_crown_on")
+    if weights is None:
+        shaped = {name: choices.spread(values) for name, values in found.items()}
+        return np.asarray(
+            criterion.costs(shaped, choices.decided_at, choices.sizes[-1])[choices.possible]
+        )
+    settings = criterion.settings
+    if settings["crown"] is None or choices.decided_at < settings["crown"]:
+        weights = settings["weights"]["before_crown"]
+    total = np.zeros(len(choices.states))
+    for name, weight in weights.items():
+        rounded = np.round(found[name] / settings["resolution"][name[0]])
+        total += weight * _ranks(rounded, choices, by_row=settings["ranked"] == "conditional")
+    return np.asarray(total / sum(weights.values()))
+
+
+def _ranks(values: Floats, choices: Choices, *, by_row: bool) -> Floats:
+    """Return mean ranks of whole numbers among all choices (n,), scaled to those of one move.
+
+    ``by_row``: of two moves among the candidates of the later one, given the one before.
+    """
+    count, known = choices.sizes[-1], np.isfinite(values)
+    if not known.any():
+        return np.full(len(values), 0.5 * (count + 1))
+    if by_row:
+        rows = np.atleast_2d(choices.spread(values))
+        ranks = np.array([_mean_ranks(row) for row in rows])
+        return np.asarray(ranks.reshape(choices.possible.shape)[choices.possible])
+    out = _mean_ranks(values)
+    if len(choices.sizes) > 1:
+        out = (out - 0.5) * count / known.sum() + 0.5
+    return out
+
+
+def _mean_ranks(values: Floats) -> Floats:
+    """Return ranks from 1, ties sharing the mean of theirs; NaN of what is no number."""
+    known, out = np.isfinite(values), np.full(len(values), np.nan)
+    _, place, times = np.unique(values[known], return_inverse=True, return_counts=True)
+    out[known] = (np.cumsum(times) - 0.5 * (times - 1))[place]
+    return out

@@ -17,7 +17,6 @@ value and a lower bound, both computed again from the problem's data.
 """
 
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import pose, solve
 
 __all__ = ["Plan", "pose", "solve"]

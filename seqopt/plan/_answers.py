@@ -6,18 +6,20 @@ returns that cannot be read is its failure, never a verdict.
 
 from __future__ import annotations
 
-import math
 import operator
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from math import inf, isfinite
 from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from seqopt._registry import Later
 from seqopt.arrays import Ints
 from seqopt.errors import (
     InfeasibleError,
@@ -28,6 +30,8 @@ from seqopt.errors import (
     TimeUpError,
     message_of,
 )
+from seqopt.graph._candidates import walk
+from seqopt.graph._spaces import barred, steps_in_hands
 from seqopt.graph.formulation import (
     Formulation,
     FormulationKind,
@@ -38,12 +42,16 @@ from seqopt.graph.formulation import (
     timed,
 )
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
-from seqopt.judge.arithmetic import Answer, Claim, OverCapError, judge_path
+from seqopt.graph.states import States
+from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
+from seqopt.work._workers import keep
 from seqopt.work.progress import INTERRUPT, answered
 
+INFEASIBLE, PATHS = Later("seqopt.plan._infeasible"), Later("seqopt.judge._paths")  # seldom needed
+COUNTED = ("each", "stability")  # of a problem: they know what was computed
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 Result = TypeVar("Result")
 
@@ -147,16 +155,21 @@ def _wholes(given: object) -> Ints:
     return out.astype(np.int64)
 
 
-def require_time(formulation: Formulation, time_limit: float) -> None:
-    """Raise a `ProblemError` unless a time limit is a number from 0, s, and is supported."""
-    if not isinstance(time_limit, Real) or not time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
-    limited = formulation.watched or "seconds" in formulation.options
-    if np.isfinite(time_limit) and not limited:
+def find(graph: States | Instance, formulation: Formulation, run: Run) -> Found:
+    """Find a path through a graph by a formulation, certified if a proof is requested.
+
+    Raises `InfeasibleError`, which says why, if no choice is feasible; `ProblemError` if graph,
+    formulation and options are incompatible; `SolverError` if the answer fails its check.
+    """
+    if not isinstance(run.time_limit, Real) or not run.time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(run.time_limit)}; give seconds from 0")
+    if isfinite(run.time_limit) and not (formulation.watched or "seconds" in formulation.options):
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+    formulation.require_options(run.options)
+    return (find_path if isinstance(graph, Instance) else _find_states)(graph, formulation, run)
 
 
-def proven(
+def _proven(
     selection: Solution, judge: Callable[[], Certificate], run: Run
 ) -> tuple[Solution, Certificate | None]:
     """Return a solution with its certificate, if one is requested and there is time for it."""
@@ -166,30 +179,104 @@ def proven(
     return replace(selection, stopped=stopped or selection.stopped), certificate
 
 
-def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
-    """Find a path by a formulation, certified if a proof is requested.
+def _find_states(problem: States, formulation: Formulation, run: Run) -> Found:
+    """Find states of a build, as `find`."""
+    start = time.perf_counter()
+    told: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
+    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
+    limit = {"watch": watch} if formulation.watched else {"seconds": run.left}
+    limit = limit if formulation.watched or isfinite(run.left) else {}
+    with keep(problem.resources.executor, problem.resources.workers):
+        with run.clock.needed("finding a first plan"):
+            options = {**run.options, **told, **limit}
+            selection = _choose_states(formulation, problem, options, run)
+        stopped = run.clock.why(selection.stopped)
+        selection = replace(selection, stopped=stopped, trace=watch.trace)
+        solved = time.perf_counter()
+        if run.proof and run.progress is not None:
+            run.progress("proving that no plan is better")
+        twin = replace(problem, answers={})  # it knows nothing that was computed for the search
+        space = ordered(twin, selection.order).space
+        steps = steps_in_hands(space, selection.states, selection.grips)
+        hint = dict(enumerate(selection.visited, start=twin.space.first))
+        exact = formulation.kind is FormulationKind.EXACT
+        judge = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
+        selection, certificate = _proven(selection, judge, run)
+    problem.certified.update(twin.certified)
+    written = selection.compile_seconds
+    seconds = {"compile": written, "solve": solved - start - written}
+    seconds["verify"] = time.perf_counter() - solved
+    return Found(selection, certificate, steps, seconds)
 
-    On an interrupt the formulation returns its incumbent. Raises `InfeasibleError` if no path is
-    within all caps; `SolverError` if the answer fails its check; `KeyboardInterrupt` if there is no
-    incumbent yet.
+
+def _for_search(problem: States) -> States:
+    """Return a copy for a formulation: what it changes is its own, and the judge keeps its own."""
+    own = replace(problem, judged={})
+    known = {key: vars(problem)[key] for key in COUNTED if key in vars(problem)}
+    if "each" in known:
+        known["each"] = tuple(map(_for_search, known["each"]))
+    vars(own).update(known)
+    return own
+
+
+def _choose_states(
+    formulation: Formulation, problem: States, options: Mapping[str, Any], run: Run
+) -> Solution:
+    """Return the formulation's solution, converted to numbers; raise why there is none.
+
+    Without proof, a formulation with a window walks decision by decision, where its goals are
+    steps' costs, and nothing is asked of whole builds, of whether they stand, or of scenarios.
     """
-    formulation.require_options(run.options)
-    limit = min(run.left, run.options.get("seconds", math.inf))
-    watch, seconds = Watch(limit, run.progress), {"compile": 0.0}
+    start, name, exact = time.perf_counter(), formulation.name, formulation.looks_at_all
+    limit = min(run.left, float(options.get("seconds", inf)))
+    if barred(problem) is not None:  # what every plan passes is asked before any is sought
+        raise INFEASIBLE.confirmed(replace(problem), name, limit, explain=run.explains)
+    alone, rules = formulation.window_options, problem.rules
+    walks = not run.proof and alone is not None and run.options in ({}, alone)
+    beside = problem.scenarios or problem.budgets or problem.demands or problem.paths
+    walks &= all(goal.of_criterion for goal in problem.aims) and not beside
+    if walks and rules.names_robots():
+        return walk(problem, Watch(run.left))
+    own = _for_search(problem)
+    try:
+        selection = called(name, Solution, partial(formulation.solve, own, **options))
+    except InfeasibleError as error:
+        left = limit - (time.perf_counter() - start)
+        asked = replace(problem), name, left
+        why = INFEASIBLE.confirmed(*asked, exact=exact, explain=run.explains)
+        standing = problem.standing
+        if type(why) is SolverError and standing is not None and standing.curing is not None:
+            said = (
+                f"{error} in which all states stand while mortar cures, though some are once it "
+                "has; more robots may help, or mortar with some bond from 0 s on"
+            )
+            why = INFEASIBLE.claimed(name, said, exact=exact)
+        raise why from None
+    vars(problem).update({key: vars(own)[key] for key in COUNTED if key in vars(own)})
+    return with_numbers(name, selection, len(problem.goals))
+
+
+def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
+    """Find a path through an instance, as `find`.
+
+    On an interrupt the formulation returns its incumbent; `KeyboardInterrupt` if there is none yet.
+    """
+    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
+    seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
-        selection = _selected(instance, formulation, run, watch)
+        selection = _choose_path(instance, formulation, run, watch)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with timed(seconds, "verify"):
         judge = partial(judged, instance, formulation, selection)
-        selection, certificate = proven(selection, judge, run)
+        selection, certificate = _proven(selection, judge, run)
     return Found(selection, certificate, (), seconds)
 
 
-def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
+def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
-    limit = {} if math.isinf(run.left) else {"seconds": run.left}
+    limit = {} if run.left == inf else {"seconds": run.left}
     told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
     own = deepcopy(replace(instance, resources=()))  # resources are code: they have no data
     solve = partial(
@@ -205,12 +292,10 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
             raise SolverError(
                 f"formulation {name} says that no path is allowed, and some are: {error}"
             ) from None
-        from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
-
-        raise refusal(instance, name, exact=formulation.looks_at_all) from None
+        raise INFEASIBLE.refusal(instance, name, exact=formulation.looks_at_all) from None
     except (NothingFoundError, TimeUpError) as error:
         low = watch.bound
-        said = f"{error} (no path is below {low:.6g})" if math.isfinite(low) else str(error)
+        said = f"{error} (no path is below {low:.6g})" if isfinite(low) else str(error)
         raise (KeyboardInterrupt if watch.interrupted else type(error))(said) from error
     except SolverError as error:
         if watch.interrupted:
@@ -226,11 +311,11 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
 
 def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
     """Return the certificate of a path from the multipliers and labels of its formulation."""
-    nodes = [state[0] for state in found.states]
-    answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))
+    nodes = np.array([state[0] for state in found.states])
+    answer = PATHS.Answer("nodes", nodes, found.objective, tuple(_claims(instance, found)))
     try:
-        proof = judge_path(instance, answer)
-    except OverCapError as error:
+        proof: Certificate = PATHS.judge_path(instance, answer)
+    except PATHS.OverCapError as error:
         raise SolverError(f"{error}; use a formulation that keeps budgets exactly") from None
     exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
     if exact and instance.is_plain and proof.gap > TOLERANCE:
@@ -246,40 +331,32 @@ def judged(instance: Instance, formulation: Formulation, found: Solution) -> Cer
     return replace(proof, claimed_gap=max(left))
 
 
-def _claims(instance: Instance, found: Solution) -> list[Claim]:
-    """Return the claimed bound of each goal with its multipliers, as far as they are given."""
-    kinds = [goal.kind for goal in instance.goals]
-    if instance.resources and not instance.asks_time:
+def _claims(instance: Instance, found: Solution) -> list[Any]:
+    """Return the claimed bound of each goal with its multipliers, as far as they are given.
+
+    Of makespans these are labels, if any, and shares of robot kinds.
+    """
+    claim, kinds = PATHS.Claim, [goal.kind for goal in instance.goals]
+    if instance.asks_time and instance.timed is not None:
+        _, firsts = np.unique(instance.timed.kinds, return_index=True)
+        first, own = 0 if instance.caps else kinds.index(TIME), [claim() for _ in kinds]
+        for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
+            if kinds[k] == TIME and len(proof.prices):
+                labels = (proof.states[:, 1], proof.labels) if len(proof.labels) else None
+                value = None if labels is None else found.bound[k]
+                own[k] = claim(value, shares=proof.prices[:, [0, *(1 + firsts)]], labels=labels)
+        return own
+    if instance.resources:
         pairs = zip(found.proofs, found.bound, strict=False)
         if not all(each.twin for each in instance.resources):
-            return [Claim(bound) for bound in found.bound]
-        return [Claim(b, labels=(proof.states[:, 1], proof.labels)) for proof, b in pairs]
-    if instance.asks_time:
-        return _of_times(instance, found, kinds)
+            return [claim(bound) for bound in found.bound]
+        return [claim(b, labels=(proof.states[:, 1], proof.labels)) for proof, b in pairs]
     if kinds == [TAIL]:
-        return [Claim(weights=np.array(found.prices[0]))] if found.prices else []
-    if not instance.caps:
-        return []
-    sums = [cap.name for cap in instance.caps]
-    out = list[Claim]()
+        return [claim(weights=np.array(found.prices[0]))] if found.prices else []
+    sums, out = [cap.name for cap in instance.caps], list[Any]()
     for goal, prices, bound in zip(instance.goals, found.prices, found.bound, strict=False):
         named = {n: max(p, 0.0) for n, p in zip(sums, prices, strict=False)}
-        out.append(Claim(bound if goal.kind == PEAK else None, prices=named))
+        out.append(claim(bound if goal.kind == PEAK else None, prices=named))
         if goal.kind == SUM:
             sums.append(goal.name)
-    return out
-
-
-def _of_times(instance: Instance, found: Solution, kinds: list[str]) -> list[Claim]:
-    """Return claims of makespan bounds: labels, if any, and shares of robot kinds, by arc."""
-    assert instance.timed is not None  # multipliers are of robots
-    _, firsts = np.unique(instance.timed.kinds, return_index=True)
-    first, own = 0 if instance.caps else kinds.index(TIME), [Claim() for _ in kinds]
-    for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
-        if kinds[k] == TIME and len(proof.prices):
-            claim = Claim(shares=np.asarray(proof.prices[:, [0, *(1 + firsts)]]))
-            if len(proof.labels):
-                labels = proof.states[:, 1], proof.labels
-                claim = replace(claim, value=found.bound[k], labels=labels)
-            own[k] = claim
-    return own
+    return out if instance.caps else []

@@ -32,8 +32,8 @@ from seqopt.graph.graph import distances, least_peak, least_sum, tied
 from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.space import Explorer
 from seqopt.graph.states import States
-from seqopt.judge._bounds import is_kept, least_within
 from seqopt.judge._proof import Proof, TooManyPartsError
+from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
@@ -52,7 +52,7 @@ def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
     counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
     for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
         own = instance.graph, nothing, _limited(some), 1.0
-        if least_within(*own, laid_down=instance.is_layered)[0] >= PROVEN:
+        if least_within(*own, labels=instance.is_layered) >= PROVEN:
             return some
     return ()
 
@@ -69,13 +69,10 @@ def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFou
 
 
 def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible.
-
-    ``name``, ``exact``: of the formulation that claims infeasibility, as of `claimed`.
-    """
+    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible."""
     found = smallest_conflict(instance)
-    limited, laid_down = _limited(instance.caps), instance.is_layered
-    if not found and is_kept(instance.graph, limited, laid_down=laid_down):
+    limited, labels = _limited(instance.caps), instance.is_layered
+    if not found and _is_kept(instance.graph, limited, labels=labels):
         return SolverError(
             f"formulation {name} says that no choice is within all budgets, and some are"
         )
@@ -104,10 +101,9 @@ def confirmed(
 ) -> SeqoptError:
     """Return the error that explains why a problem is infeasible, after proving that it is.
 
-    ``name``, ``exact``: of the formulation that claims so, as of `claimed`; ``seconds``: limit of
-    proof and search for remedies, s, after which the error is called claimed; ``explain``: whether
-    remedies are sought. Result: a `SolverError` if a plan is feasible, a `NothingFoundError` if
-    the stability of some states is undecided.
+    ``name``, ``exact``: as of `claimed`; ``seconds``: of proof and search for remedies, after which
+    the error is called claimed; ``explain``: whether remedies are sought. A `SolverError` if a plan
+    is feasible, a `NothingFoundError` if the stability of some states is undecided.
     """
     look, capped = Look(time.perf_counter() + seconds), problem.goals[len(problem.aims) :]
     own = (goal for goal in problem.aims if goal.of_criterion)  # whose values may be infinite
@@ -199,10 +195,7 @@ class Look:
         return StandingLook(replace(problem, goals=FEWEST, standing=None, settled=()), self.tell)
 
     def least(self, problem: States, response: str) -> float:
-        """Return the least peak of a response over all plans, SI units; infinite if infeasible.
-
-        ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``.
-        """
+        """Return the least peak of a response, or ``bond``, over all plans; infinite if none is."""
         goals = (BUILT_IN.get(response) or worst(response),)
         found = self(replace(problem, goals=goals))
         return least_peak(found.graph().graph, 0) if found.whole else np.inf
@@ -341,10 +334,7 @@ NEWTONS = sorted({m * 10**k for k in range(4) for m in range(1, 1000)})  # in th
 
 
 def _payload(problem: States, look: Look, free: States | None) -> str:
-    """Return the least payload of all robots in words; ``free``: without payloads, if one may be.
-
-    Then it is the least peak of forces, or what the heaviest brick asks of any robot of the team.
-    """
+    """Return the least payload of all robots in words; ``free``: without any, if one may be."""
     if free is None:
         least: float = min(robot.payload for robot in problem.network.scene.robots)
         first, end = (bisect_left(NEWTONS, each) for each in (least, NEWTONS[-1]))

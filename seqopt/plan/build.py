@@ -67,9 +67,8 @@ class ShownBuild(Shown):
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step, as of `seqopt.analyze`.
 
-        Result: a row per step; of a schedule the robots whose grips were chosen beside, as
-        ``optimized_robot``. Raises `ProblemError` if a problem is given by its costs alone; so do
-        the tables below.
+        Of a schedule the robots whose grips were chosen are beside, as ``optimized_robot``. Raises
+        `ProblemError` if a problem is given by its costs alone; so do the tables below.
         """
         return _table_of(self._columns)
 
@@ -92,20 +91,16 @@ class ShownBuild(Shown):
         return grips_table(self.engine.network.scene, self.steps, self.responses())
 
     def stability(self, mortar: Mortar | str) -> pd.DataFrame:
-        """Return whether every step stands with a mortar, and by which margins.
+        """Return whether every step stands with a mortar, or its name, and by which margins.
 
         Margins take ten times as long as `verdicts` alone. Movements of the ground enter neither.
-        ``mortar``: of all joints; or its name, ``dry`` or ``epoxy``. Result: as of
-        `seqopt.stability._steps.stability_table`.
+        Result: as of `seqopt.stability._steps.stability_table`.
         """
         results = assess_steps(self.engine.network, self.steps, mortar, MARGINS)
         return stability_table(self.steps, results)
 
     def verdicts(self, mortar: Mortar | str = "dry") -> tuple[Verdict, ...]:
-        """Return of every step whether it stands with a mortar, without margins: in seconds.
-
-        ``mortar``: of all joints; or its name, ``dry``, ``epoxy`` or ``bond=PASCAL``.
-        """
+        """Return whether every step stands, without margins: in seconds; ``bond=PASCAL``, too."""
         return step_verdicts(self.engine.network, self.steps, find_mortar(mortar))
 
     def props(self) -> pd.DataFrame:
@@ -124,15 +119,9 @@ class ShownBuild(Shown):
         which no robot exceeds its payload, and what ``stops`` grips from being farther off. Raises
         `ProblemError` for discrete elements, which are not linear in that.
         """
-        found = [step_tolerance(self.engine, step) for step in self.steps]
-        return pd.DataFrame(
-            {
-                "step": [step.number for step in self.steps],
-                COLUMN: [1e3 * each.distance for each in found],
-                "proven_mm": [1e3 * each.proven for each in found],
-                "stops": [each.what for each in found],
-            }
-        )
+        found = [(step.number, step_tolerance(self.engine, step)) for step in self.steps]
+        rows = [(k, 1e3 * each.distance, 1e3 * each.proven, each.what) for k, each in found]
+        return pd.DataFrame(rows, columns=["step", COLUMN, "proven_mm", "stops"])
 
     def times(self) -> pd.DataFrame:
         """Return the earliest start and end times of all actions, in the order of the steps.
@@ -144,18 +133,16 @@ class ShownBuild(Shown):
         ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
         takes that acts.
         """
-        scene = self.engine.network.scene
-        table: pd.DataFrame = offered("times_table")(scene, self.steps, self._waits, self._begin)
+        table: pd.DataFrame = self._in_time("times_table")
         return table
 
     @property
     def makespan(self) -> float | None:
         """The makespan of the build, s; None if durations are not known."""
-        if not self._timed:
-            return None
-        scene = self.engine.network.scene
-        times = offered("step_times")(scene, self.steps, self._waits, self._begin)
-        return float(times[-1].end)
+        return float(self._in_time("step_times")[-1].end) if self._timed else None
+
+    def _in_time(self, name: str) -> Any:
+        return offered(name)(self.engine.network.scene, self.steps, self._waits, self._begin)
 
     @cached_property
     def _waits(self) -> Any:
@@ -205,10 +192,9 @@ class ShownBuild(Shown):
     ) -> Figure:
         """Draw the grips over the steps of the build: a lane per robot, a bar per grip.
 
-        Where it is known how long robots take, over seconds: with what they prepare, hatched.
-
-        Every bar names its brick and its node, says whether the robot places the brick or holds it,
-        and is shaded by the force of the grip.
+        Where it is known how long robots take, over seconds: with what they prepare, hatched. Every
+        bar names its brick and its node, says whether the robot places the brick or holds it, and
+        is shaded by the force of the grip.
 
         ``first``, ``last``: numbers of the first and the last step that are drawn; by default all;
         ``seconds``: whether time goes along, by default if it is known. Raises `ExtraError` if
@@ -232,14 +218,11 @@ class ShownBuild(Shown):
         return text
 
     def report(self, *others: ShownBuild) -> Page:
-        """Return a page that shows the build step by step, in three dimensions.
+        """Return a page that shows the build step by step, in three dimensions, tables and charts.
 
-        The page also has tables and charts. If the scene is small, the fixed methods are shown
-        next to the plan.
-
-        ``*others``: other plans for the same scene, to compare side by side. Result: a notebook
-        shows it; ``save("report.html")`` writes it to a file, and ``open()`` shows it in a browser.
-        Raises `ProblemError` if another plan is for another scene.
+        If the scene is small, the fixed methods are shown next to the plan. ``*others``: plans for
+        the same scene, to compare side by side; else a `ProblemError`. Result: a notebook shows it;
+        ``save("report.html")`` writes it to a file, and ``open()`` shows it in a browser.
         """
         page: Page = display(ShownBuild, "report")(self, *others)
         return page

@@ -23,8 +23,7 @@ from seqopt.judge._schedules import ordered, plan_values
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._answers import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import best_within, leaves
+from seqopt.plan.solve import best_within, graph_of, leaves
 from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
 from seqopt.responses._grip_sets import Moved, most_moved

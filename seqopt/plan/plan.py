@@ -12,14 +12,13 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._registry import display
+from seqopt._registry import Later, display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import DEFAULT, provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
 from seqopt.graph.instance import Instance
 from seqopt.graph.states import States
-from seqopt.judge._step_checks import certified
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Criterion
@@ -49,6 +48,7 @@ from seqopt.stability._steps import stability_table
 from seqopt.stability.standing import Standing
 from seqopt.work.progress import Tell
 
+PROOFS = Later("seqopt.judge._schedules")  # 20 ms
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
 
@@ -171,18 +171,13 @@ class Plan(ShownBuild):
 
     @property
     def states(self) -> States:
-        """The states and moves that it was chosen from."""
-        return self._of_scene
-
-    @property
-    def _of_scene(self) -> States:
-        """The graph of a scene; raises `ProblemError` if only costs were given."""
+        """The states and moves that it was chosen from; a `ProblemError` if these are costs."""
         return self.graph.alone_in_scene
 
     @property
     def engine(self) -> Engine:  # type: ignore[override]
         """The engine of the responses, for the scene in the order of the plan."""
-        return self._of_scene.engine
+        return self.states.engine
 
     @property
     def standing(self) -> Standing | None:  # type: ignore[override]
@@ -192,14 +187,14 @@ class Plan(ShownBuild):
     @property
     def method(self) -> str:
         """The name of the schedule, or ``free``."""
-        return self._of_scene.method
+        return self.states.method
 
     @property
     def title(self) -> str:  # type: ignore[override]
         """The name of the plan where it is shown next to others."""
         if self.order:
             return "best order"
-        opens_grips = self.steps and self._of_scene.rules.moves
+        opens_grips = self.steps and self.states.rules.moves
         return self.formulation.name if opens_grips else self.graph.title or self.formulation.name
 
     @property
@@ -215,14 +210,10 @@ class Plan(ShownBuild):
     @property
     def objective(self) -> dict[str, float]:
         """The value of every goal by its name; of a tilt the critical one, in degrees."""
-        claimed, proof = self.selection.objective, self.certificate
-        if proof is not None:
-            return self.in_display_units(proof.values)
-        return self.in_display_units(claimed) if isfinite(claimed[0]) else {}
-
-    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
-        """Return values of the first goals by their names, a tilt in degrees."""
-        return self.graph.in_display_units(values)
+        if self.certificate is not None:
+            return self.graph.in_display_units(self.certificate.values)
+        claimed = self.selection.objective
+        return self.graph.in_display_units(claimed) if isfinite(claimed[0]) else {}
 
     @property
     def bound(self) -> dict[str, float | None]:
@@ -236,7 +227,7 @@ class Plan(ShownBuild):
             bounds = claimed
         elif proof is not None and self.stopped and not isfinite(proof.gap):
             bounds = tuple(map(max, claimed, bounds))
-        found = self.in_display_units(self.graph.bounded(bounds))
+        found = self.graph.in_display_units(self.graph.bounded(bounds))
         return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
     @property
@@ -272,11 +263,11 @@ class Plan(ShownBuild):
             return Status.FEASIBLE if stopped else Status.UNPROVEN
         exact = not stopped and self.formulation.kind is FormulationKind.EXACT
         settled = self.graph.settles(exact=exact) and isfinite(proof.gap)
-        if settled or proof.gap <= TOLERANCE:
-            return Status.OUTSIDE if self.is_far else Status.OPTIMAL
-        if proof.claimed_gap <= TOLERANCE:
-            return Status.OUTSIDE if self.is_far else Status.CLAIMED
-        return Status.FEASIBLE
+        is_proven = settled or proof.gap <= TOLERANCE
+        if not is_proven and not proof.claimed_gap <= TOLERANCE:
+            return Status.FEASIBLE
+        best = Status.OPTIMAL if is_proven else Status.CLAIMED
+        return Status.OUTSIDE if self.is_far else best
 
     @property
     def result(self) -> str:  # type: ignore[override]
@@ -296,7 +287,7 @@ class Plan(ShownBuild):
     @property
     def choice(self) -> tuple[int, ...]:
         """The number of the chosen candidate of every move; raises `ProblemError` without moves."""
-        pairs = zip(self._of_scene.rules.moves, self.nodes, strict=True)
+        pairs = zip(self.states.rules.moves, self.nodes, strict=True)
         return tuple(move.candidates.index(node) for move, node in pairs)
 
     @property
@@ -329,7 +320,7 @@ class Plan(ShownBuild):
         fields = _each_fields(self.engine, self.steps, Want.ALL)
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        columns.update(self._of_scene.rules.step_columns(self.steps))
+        columns.update(self.states.rules.step_columns(self.steps))
         return columns
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
@@ -339,7 +330,7 @@ class Plan(ShownBuild):
         `seqopt.stability._steps.stability_table`.
         """
         if mortar is None and self.standing is not None:
-            return stability_table(self.steps, certified(self.states, self.steps))
+            return stability_table(self.steps, PROOFS.certified(self.states, self.steps))
         return super().stability("dry" if mortar is None else mortar)
 
     def summary(self) -> dict[str, object]:
@@ -357,12 +348,13 @@ class Plan(ShownBuild):
         ``order``, ``orders`` (among which) and ``order_evaluated``; the ``engine`` and
         ``versions``.
         """
+        named = {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
         if not self.steps:  # a path through an instance, or given costs
             known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
             spent = dict(getattr(self.certificate, "spent", {}))
-            whole = {**self._named(), **known, **self._answer(), "budgets": spent}
+            whole = {**named, **known, **self._answer(), "budgets": spent}
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}
-        graph, scene = self._of_scene, self.engine.network.scene
+        graph, scene = self.states, self.engine.network.scene
         asked = self.problem if isinstance(self.problem, Problem) else graph
         of_order: dict[str, object] = {}
         if self.order:
@@ -372,7 +364,7 @@ class Plan(ShownBuild):
         return {
             "scene": scene.name,
             "schedule": self.method,
-            **self._named(),
+            **named,
             **graph.described(_said_limits(asked.limits)),
             "candidates": f"heuristic: {graph.among}" if graph.among else "all",
             **self._answer(),
@@ -401,7 +393,7 @@ class Plan(ShownBuild):
         ``computed``, beside grip forces, which come with all; ``verdicts``: ``asked`` of grip sets,
         and the linear ``programs`` that these took.
         """
-        graph, proof = self._of_scene, self.certificate
+        graph, proof = self.states, self.certificate
         stands = None if graph.standing is None else graph.stability
         return {
             "models": {
@@ -416,9 +408,6 @@ class Plan(ShownBuild):
                 "programs": 0 if stands is None else stands.programs,
             },
         }
-
-    def _named(self) -> dict[str, object]:
-        return {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
 
     def _answer(self) -> dict[str, object]:
         """Return the entries of a summary about values and what is proven of them."""

@@ -21,10 +21,7 @@ from seqopt.sequence.steps import Step, _begin_step
 
 
 def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
-    """Return the goals' values of steps that continue from the beginning of a problem.
-
-    Raises a `SeqoptError` that names what they break.
-    """
+    """Return goals' values of steps that go on from a beginning; an error says what they break."""
     rules = states.free_rules
     scene, kept = states.network.scene, rules.payload is Payload.KEPT
     begun = (_begin_step(scene, rules.begin), *steps)
@@ -65,10 +62,7 @@ def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
 
 
 def asked_before(summary: Any, *, lost: bool = False) -> dict[str, Any]:
-    """Return what a plan was asked, in words, from its summary.
-
-    ``lost``: with the defaults of fewer robots.
-    """
+    """Return what a plan was asked, in words, from its summary; ``lost``: of fewer robots."""
     if not isinstance(summary, dict) or summary.get("schedule") != FREE:
         summary = {}
     given = [

@@ -1,35 +1,175 @@
-"""From a problem to its plan: a graph of states, a formulation, a judge.
+"""From a question to its plan: a problem, its graph of states, a formulation, a judge.
 
-A problem becomes the graph of the states of its builds; an instance has its arcs. A formulation
-chooses a path through it. The judge computes its values and a bound again, from the problem's own
-data. What was found and proven is the plan.
+A problem is what is asked of a build (`pose`). It becomes the graph of the states of its builds; an
+instance has its arcs. A formulation chooses a path through it (`solve`). The judge computes its
+values and a bound again, from the problem's own data. What was found and proven is the plan.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from seqopt._registry import Later
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import simplest
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, message_of
 from seqopt.graph.formulation import End, Formulation, Run, as_formulation
 from seqopt.graph.instance import Instance
-from seqopt.graph.states import States
-from seqopt.plan._answers import find_path, require_time
+from seqopt.graph.states import States, build_states, over_scenarios, within
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import default_formulation, graph_of
-from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Limit
-from seqopt.responses._grip_sets import Moved, most_moved
+from seqopt.problem.amounts import MINMAX, SUM, Amount
+from seqopt.problem.criteria import Criterion
+from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
+from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, require_parts
+from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
 from seqopt.scene.arm import from_arms
+from seqopt.scene.scenarios import Scenarios
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule import Schedule
+from seqopt.stability.standing import Standing
 from seqopt.work.progress import INTERRUPT
 
+ANSWERS, PROOFS = Later("seqopt.plan._answers"), Later("seqopt.judge._schedules")  # 20 ms
+ORDERS = Later("seqopt.graph._spaces")  # few problems seek an order
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 INTERRUPTED = f"{UNKNOWN} (interrupted)"
 Measured = TypeVar("Measured", bound=Any)  # a plan, or a Pareto set
+
+
+def pose(  # noqa: PLR0913  # every question is a word of its own
+    engine: Engine,
+    moves: Schedule | FreeRules,
+    criterion: Criterion,
+    goals: Sequence[Amount] | str = (),
+    limits: Sequence[Limit | Filter | str] | str = (),
+    *,
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    scenarios: Scenarios | Sequence[Scene] = (),
+    over: RobustAim | str = WORST_PEAK,
+    orders: Orders | str | None = None,
+    resources: Resources = HERE,
+) -> Problem:
+    """Create a `Problem` of a build; strings are parsed.
+
+    Parameters
+    ----------
+    engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
+        What has the scene, what can be chosen, what a step costs; of ``auto`` its simplest level.
+    goals : sequence of Amount or str, optional
+        As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
+        largest, as the formulation minimizes, and of rules the worst step.
+    limits, budgets, stands, scenarios, over, orders, resources : optional
+        As of `Problem`: ``"F_largest=300"``, ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`,
+        ``"cvar=0.9"`` (or ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
+
+    Returns
+    -------
+    Problem
+        Nothing is computed yet, except scales that a criterion takes from the scene.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such response, no grip is open, or parts of the question are incompatible.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("auto", seqopt.load_scene("arch25"))
+    >>> worst = seqopt.CRITERIA["worst-ratio"]
+    >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
+    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
+    """
+    asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
+    worlds = {"scenarios": scenarios, "over": over, "orders": orders}
+    engine = simplest(engine)
+    require_parts(engine, moves, criterion)
+    problem = Problem.asked(engine, moves, criterion, **asked, **worlds, resources=resources)
+    posed = replace(problem, criterion=graph_of(problem).criterion)  # with the scene's numbers
+    posed.graphs.update(problem.graphs)
+    return posed
+
+
+def chooses_moves(problem: Problem) -> bool:
+    """Return whether candidates of moves are chosen by default, as the formulation minimizes."""
+    beside = problem.filters or problem.paths or problem.stands is not None or problem.orders
+    return problem.moves.has_pairs and not (problem.is_timed or problem.goals or beside)
+
+
+def graph_of(problem: Problem, aim: Aim | None = None) -> States:
+    """Return the states and moves of a problem, cached with what was computed for them.
+
+    ``aim``: what the formulation minimizes where the problem names no goal; by default of open
+    grips the sum of costs, of free rules the worst step; over scenarios as these are joined. Raises
+    `ProblemError` if the problem has no such graph.
+    """
+    if chooses_moves(problem) and not problem.moves.moves:
+        raise ProblemError(
+            f"schedule {problem.method}: with {len(problem.scene.bricks)} bricks it leaves no grip "
+            "open; there is nothing to choose, analyze its steps"
+        )
+    aim = aim or (Aim.SUM if chooses_moves(problem) else Aim.PEAK)
+    aim = problem.over.aim if problem.scenarios else aim
+    goals = problem.goals or ({Aim.SUM: SUM, Aim.PEAK: MINMAX}[aim],)
+    if goals not in problem.graphs:
+        found = _build_graph(replace(problem, goals=goals))
+        known = next(iter(problem.graphs.values()), found)
+        problem.graphs[goals] = replace(found, answers=known.answers, judged=known.judged)
+    out: States = problem.graphs[goals]
+    return out
+
+
+def _build_graph(problem: Problem) -> States:
+    """Return the graph of a problem, with goals, constraints, scenarios and orders."""
+    over = problem.over if problem.scenarios else WORST_PEAK
+    if problem.orders is not None and problem.is_timed:
+        raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
+    if problem.orders is not None and problem.paths:
+        raise ProblemError(f"resource {problem.paths[0]}: it is kept in one order; give an order")
+    asked = problem.engine, problem.moves, problem.criterion, problem.goals, problem.limits
+    found = build_states(*asked, problem.stands)
+    check_parts(problem.filters, problem.scene, problem.moves)
+    found = replace(found, resources=problem.resources, filters=problem.filters)
+    found = replace(found, paths=problem.paths)
+    space = found.space
+    if space.first == space.levels and space.ended(space.start()).all():
+        raise ProblemError("nothing is left to plan: the build begins as it may end")
+    if problem.is_timed and found.free_rules.takes_down:
+        raise ProblemError(
+            "aim makespan: how long it takes to take bricks away is not modeled; leave "
+            "direction=take-down out"
+        )
+    if problem.paths and problem.scenarios and over.aim is Aim.SUM:
+        raise ProblemError(f"resource {problem.paths[0]}: totals over scenarios take none")
+    caps: dict[Amount | str, float] = {c.amount: c.bound for c in problem.budgets if not c.share}
+    found = within(found, caps) if caps else found
+    if found.standing is not None and found.standing.curing is not None and not found.is_timed:
+        raise ProblemError(
+            "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"
+        )
+    found = over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
+    sought: States = found if problem.orders is None else ORDERS.among_orders(found, problem.orders)
+    return sought
+
+
+def default_formulation(problem: Problem) -> str:
+    """Return the name of the formulation that solves a problem if none is named."""
+    graph = graph_of(problem)
+    if not chooses_moves(problem):
+        return graph.default_formulation
+    if problem.scenarios and graph.totals:
+        return "scenario_search"
+    if problem.scenarios:
+        return "schedule_search" if problem.budgets else "minimax"
+    return "labels" if problem.budgets else "overlap_dp"
 
 
 def solve(
@@ -46,8 +186,7 @@ def solve(
     Parameters
     ----------
     problem : Problem or Instance
-        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as of
-        `seqopt.plan.pose.graph_of`.
+        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as of `graph_of`.
     formulation : Formulation or str, optional
         Or a name in `seqopt.formulations`; by default the fastest exact one that there is for it.
     proof : bool, optional
@@ -110,14 +249,20 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         plan = solved(asked)
         if asked.scene.has_arms:
             plan = from_arms("with_postures")(asked, plan, solved)
-
+        moved = None if plan.certificate is None else plan.certificate.moved
         each = (most_moved(own, plan.steps) for own in plan.graph.scenarios or (plan.engine,))
-        return replace(plan, moved=max(each, key=lambda moved: moved.share))
+        return replace(plan, moved=moved or max(each, key=lambda moved: moved.share))
 
     def interrupted(plan: Plan) -> Plan:
         return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
 
     return replace(best_within(problem, best, lambda p: p.moved, interrupted), problem=given)
+
+
+def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Plan:
+    """Let a formulation choose from a graph; the judged answer is a plan."""
+    found = ANSWERS.find(graph, formulation, run)
+    return Plan(graph, graph.at(found.selection.order), formulation, *found)
 
 
 def without_shares(problem: Problem, run: Run | None = None) -> Problem:
@@ -128,32 +273,14 @@ def without_shares(problem: Problem, run: Run | None = None) -> Problem:
     shares = [cap for cap in problem.budgets if cap.share]
     if not shares:
         return problem
-    from seqopt.judge._schedules import plan_values  # noqa: PLC0415  # with its proofs
-
     free = replace(problem, budgets=())
     plan = _solve_run(free, None, Run(proof=False, clock=(run or Run()).clock))
     asked = replace(graph_of(free), goals=tuple(cap.amount for cap in shares))
-    taken = dict(zip(shares, plan_values(asked, plan.steps), strict=True))
+    taken = dict(zip(shares, PROOFS.plan_values(asked, plan.steps), strict=True))
     caps = (
         replace(c, bound=c.bound * taken[c], share=False) if c.share else c for c in problem.budgets
     )
     return replace(problem, budgets=tuple(caps))
-
-
-def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Plan:
-    """Let a formulation choose from a graph; the judged answer is a plan.
-
-    Raises `InfeasibleError` if no choice is feasible; `ProblemError` if graph, formulation and
-    options are incompatible; `SolverError` if an answer fails its check.
-    """
-    require_time(formulation, run.time_limit)
-    if isinstance(graph, Instance):
-        found = find_path(graph, formulation, run)
-    else:
-        from seqopt.plan._states import find_states  # noqa: PLC0415  # with their proofs
-
-        found = find_states(graph, formulation, run)
-    return Plan(graph, graph.at(found.selection.order), formulation, *found)
 
 
 def on_the_way(plan: Plan) -> Plan:

@@ -18,7 +18,7 @@ from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_in_postures, tas
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.amounts import judged_by
 from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import comparison_page, front_page, plan_page

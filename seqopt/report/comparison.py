@@ -17,8 +17,7 @@ from seqopt.engines.registry import simplest
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import on_the_way, solve
+from seqopt.plan.solve import graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import _prop_faults, overloads

@@ -12,10 +12,10 @@ from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph, _to_go
 from seqopt.graph.instance import TIME, Instance, TimedGraph, _Target
-from seqopt.judge._bounds import Book, Closed, is_beyond_limits, limit_below
+from seqopt.judge._paths import Claim
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Claim, Stage, _sum, sum_books
+from seqopt.judge.arithmetic import Book, Closed, Stage, _is_beyond_limits, _sum_bound, limit_below
 from seqopt.network.network import Network
 from seqopt.stability.standing import Standing
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
@@ -60,7 +60,7 @@ class Clock(Book):
         for multipliers, left in zip(self._multipliers, self._left, strict=True):
             bound = multipliers[0] * end + busy @ multipliers[1:] + left[state]
             ends = np.where(over, ends, np.maximum(ends, bound))
-        return is_beyond_limits(ends[:, None], *self._limit)
+        return _is_beyond_limits(ends[:, None], *self._limit)
 
     def counted(self, state: Ints, values: Floats) -> Floats:
         """Return labels with the readiness and ages that count.
@@ -180,10 +180,11 @@ class Floors:
         return out
 
 
-def claimed_time(
-    instance: Instance, stage: Stage, claim: Claim, limited: Sequence[tuple[float, int, float]]
-) -> float:
-    """Return when the last act ends at the earliest, by shares of the time of robots."""
+def claimed_time(instance: Instance, stage: Stage, claim: Claim, prices: Sequence[float]) -> float:
+    """Return when the last act ends at the earliest, by shares of the time of robots.
+
+    ``prices``: multipliers of the caps of a stage.
+    """
     timed = instance.timed
     assert timed is not None  # an instance that asks for a time has it
     every, some = (
@@ -200,15 +201,15 @@ def claimed_time(
         acts = acts_of_instance(timed, stage.graph, kept)
         multipliers = np.column_stack([shares[:, 0], shares[:, 1:][:, timed.kinds]])
         clock = Clock(acts, multipliers, limit_below(claim.value), strict=True)
-        books = sum_books(stage, _Target("", TIME), claim.value, acts.move)
+        books = stage.books(_Target("", TIME), claim.value, acts.move)
         closed = Closed(stage.graph, acts.move, [clock, *books])
         own = values[:, 1 : 1 + acts.count]
         since = alike_in_order(acts.groups, acts.entries[nodes], own)
         values = np.column_stack([values[:, 0], since, values[:, 1 + acts.count :]])
-        if closed.is_proof((nodes, values), lambda states: np.zeros(len(states), dtype=bool)):
+        if closed.is_proof((nodes, values)):
             return claim.value
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
-    bounds = [_sum(stage, timed.work[kept] @ own, limited) for own in shares]
+    bounds = [_sum_bound(stage, timed.work[kept] @ own, prices) for own in shares]
     return max(bounds) * (1 - 1e-12)
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from seqopt.errors import ProblemError, StepError
-from seqopt.judge._twin import PathTwin
+from seqopt.judge.certificate import PathTwin
 from seqopt.problem.amounts import Amount
 from seqopt.times._clock import TimedRows, claimed_time, path_makespan
 from seqopt.times._step_check import makespan_of_steps

@@ -17,8 +17,7 @@ from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
 from seqopt.graph._candidates import walk
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
 from seqopt.graph.states import build_states
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.methods import SCHEDULES, modified_sequential, three_robot_loop

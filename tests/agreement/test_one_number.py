@@ -19,7 +19,7 @@ from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import FormulationKind, exhibits, formulations
 from seqopt.instances.compiled import compile_instance
 from seqopt.judge._schedules import plan_values
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim

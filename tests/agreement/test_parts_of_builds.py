@@ -16,7 +16,7 @@ from seqopt.graph._spaces import order_rules
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Orders
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order

@@ -15,7 +15,7 @@ import seqopt
 from seqopt._cli.arguments import request
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
-from seqopt.plan import _states
+from seqopt.plan import _answers
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.work.progress import INTERRUPT, TIME, Clock
@@ -108,9 +108,9 @@ def in_the_midst(monkeypatch, module, name, how):
 @pytest.mark.parametrize(
     ("words", "module", "judge", "how", "status"),
     [
-        (FREE, _states, "judge_schedule", TimeoutError, 0),
-        (LOOP, _states, "judge_schedule", TimeoutError, 0),
-        (LOOP, _states, "judge_schedule", KeyboardInterrupt, 130),
+        (FREE, _answers, "judge_schedule", TimeoutError, 0),
+        (LOOP, _answers, "judge_schedule", TimeoutError, 0),
+        (LOOP, _answers, "judge_schedule", KeyboardInterrupt, 130),
     ],
 )
 def test_a_proof_that_is_ended_leaves_what_is_claimed(

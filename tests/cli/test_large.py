@@ -18,7 +18,7 @@ from seqopt import workflow
 from seqopt._cli.answer import Status
 from seqopt._cli.main import main
 from seqopt.graph.formulation import Finding
-from seqopt.plan import _states as states
+from seqopt.plan import _answers as answers
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.workflow import _parse_size
 from tests.builders import ROOT, small_arch
@@ -115,13 +115,13 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
 
 def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
     """One plan that was interrupted does not let the next begin."""
-    selected = states._selected
+    selected = answers._choose_states
 
     def interrupted(formulation, problem, options, run):
         options["watch"].interrupt()
         return selected(formulation, problem, options, run)
 
-    monkeypatch.setattr(states, "_selected", interrupted)
+    monkeypatch.setattr(answers, "_choose_states", interrupted)
     assert main(["compare"]) == 130
     assert capsys.readouterr().err == "seqopt: interrupted\n"
 

@@ -179,7 +179,7 @@ def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
             super().__init__(0.0)
 
     monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
-    monkeypatch.setattr("seqopt.plan._states.Watch", Late)
+    monkeypatch.setattr("seqopt.plan._answers.Watch", Late)
     plan, best = seqopt.solve(posed(aim), name), known((4, 2), aim)
     assert (plan.status, plan.selection.stopped) == ("feasible", "time")
     assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)

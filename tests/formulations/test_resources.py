@@ -12,7 +12,7 @@ import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError
 from seqopt.graph._spaces import explore
 from seqopt.graph.formulation import LabelProof, find_formulation
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem import Resource
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES

@@ -16,8 +16,7 @@ from seqopt.graph._candidates import _branches
 from seqopt.graph._labels import CappedSums, Joint, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import FAILS, PASSES, _lazy_path
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar
 from seqopt.study import EQUATIONS

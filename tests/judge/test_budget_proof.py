@@ -28,11 +28,10 @@ from seqopt.graph.graph import (
     reached,
 )
 from seqopt.graph.states import build_states
-from seqopt.judge import _bounds as budget_proof
-from seqopt.judge._bounds import least_within
+from seqopt.judge import arithmetic as budget_proof
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.judge._states import Filter, StateEvaluator
-from seqopt.judge.arithmetic import budget_bounds
+from seqopt.judge.arithmetic import budget_bounds, least_within
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
@@ -54,7 +53,7 @@ def bounded(problem, value, claimed):
     costs = instance.amounts[:, 0]
     prices = [max(0.0, claimed.get(cap.name, 0.0)) for cap in instance.caps]
     own = instance.graph, costs, limited, value
-    return least_within(*own, prices=prices, laid_down=True)[0]
+    return least_within(*own, prices=prices, labels=True)
 
 
 @pytest.mark.parametrize("most", [1, 5_000])

@@ -19,7 +19,7 @@ from seqopt.graph.graph import TIED
 from seqopt.network.build import build_network
 from seqopt.plan import front as fronts
 from seqopt.plan.front import find_front
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scenarios import require_alike
 from seqopt.workflow import Robust

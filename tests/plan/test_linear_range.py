@@ -14,15 +14,13 @@ from seqopt.engines.interface import Want, linear_limit
 from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
-from seqopt.judge._schedules import judge_schedule
-from seqopt.judge._step_checks import check_shape
+from seqopt.judge._schedules import check_shape, judge_schedule
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import INTERRUPTED, NONE_KEEPS, UNKNOWN, best_within
+from seqopt.plan.solve import INTERRUPTED, NONE_KEEPS, UNKNOWN, best_within, graph_of
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits, parse_limits
-from seqopt.responses._grip_sets import Moved
+from seqopt.responses._grip_sets import Moved, most_moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import three_robot_loop
@@ -102,6 +100,20 @@ def test_the_best_plan_keeps_the_range_wherever_one_does(words, formulation):
     assert plan.certificate.values >= tuple(v * (1 - 1e-9) for v in free.certificate.values)
     assert plan.problem is problem
     assert plan.summary()["limits"] == {}
+
+
+@pytest.mark.parametrize("kind", ["free", "budget", "orders", "scenarios", "loop, scenarios"])
+def test_the_judge_finds_displacements_again(kind):
+    """To six digits those of another way to compute them."""
+    words, formulation = KINDS[kind]
+    plan = seqopt.solve(posed(small_arch(3 if kind == "orders" else 5), **words), formulation)
+    engines = plan.graph.scenarios or (plan.engine,)
+    far = max(most_moved(engine, plan.steps).share for engine in engines)
+    assert plan.moved is plan.certificate.moved
+    assert plan.moved.share == pytest.approx(far, rel=1e-5)
+    (step,) = [step for step in plan.steps if step.number == plan.moved.step]
+    shares = [most_moved(engine, [step]).share for engine in engines]
+    assert max(shares) == pytest.approx(far, rel=1e-5)
 
 
 SOFT = 1e-6

@@ -19,8 +19,7 @@ from seqopt.errors import (
 )
 from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
 from seqopt.network.build import build_network
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.requirements import Limit
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
@@ -144,8 +143,8 @@ def test_that_budgets_conflict_is_proven(bounds, kind, error, said):
 )
 def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said):
     """Where the judge gives up, as here with no partial choice kept, an exact one claims it."""
-    monkeypatch.setattr("seqopt.judge._bounds.MOST", 0)
-    monkeypatch.setattr("seqopt.judge._bounds.MIXTURES", 0)
+    monkeypatch.setattr("seqopt.judge.arithmetic.MOST", 0)
+    monkeypatch.setattr("seqopt.judge.arithmetic.MIXTURES", 0)
     costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
     both = [(np.array([0.5, 2.0])[::turn],) * 2 for turn in (1, -1)]
     budgets = tuple(Budget(f"b{k}", b, costs.shared, 2.5) for k, b in enumerate(both))

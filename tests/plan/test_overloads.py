@@ -15,8 +15,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states import build_states
 from seqopt.plan._infeasible import payload_advice
-from seqopt.plan.pose import graph_of
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
 from seqopt.workflow import Robust
@@ -70,7 +69,7 @@ def small():
 
 
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
-    monkeypatch.setattr("seqopt.judge.arithmetic.proven", lambda *_: 99.0)
+    monkeypatch.setattr("seqopt.judge._paths.proven", lambda *_: 99.0)
     with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):
         seqopt.solve(small(), "overlap_dp")
 

@@ -13,10 +13,10 @@ import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.judge._rule_moves import check_free
-from seqopt.judge._schedules import judge_schedule
-from seqopt.judge._step_checks import check_props, props_that_hold
-from seqopt.plan.pose import graph_of
+from seqopt.judge._schedules import check_props, judge_schedule
+from seqopt.judge._states import props_that_hold
 from seqopt.plan.replan import compared, goes_on
+from seqopt.plan.solve import graph_of
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.sequence.part import without
 from seqopt.sequence.rules import FreeRules

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt._registry import ADDED
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem import Amount, Filter
 from seqopt.problem.amounts import BUILT_IN, find_amount
 from seqopt.problem.criteria import (
@@ -36,7 +36,7 @@ from tests.builders import small_arch
 
 PACKAGE = """
 import numpy as np
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem import Amount, Filter
 
 BUSY = Amount("busy", lambda states: (states.nodes >= 0).sum(axis=1))

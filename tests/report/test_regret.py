@@ -12,7 +12,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import NothingFoundError
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.report._regret._chart import PALE, regret_chart
 from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
 from seqopt.report._regret._table import CUT, DONE, FALLS, SAME, RegretTable, dominated

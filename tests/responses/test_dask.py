@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.plan.pose import graph_of, pose
+from seqopt.plan.solve import graph_of, pose
 from seqopt.responses import _grip_sets as batches
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.study import EQUATIONS

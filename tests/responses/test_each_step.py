@@ -19,8 +19,7 @@ from seqopt.engines.interface import FLAGS, Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, SolverError
 from seqopt.network.build import build_network
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
 from seqopt.responses import _grip_sets as batches

@@ -21,8 +21,7 @@ from seqopt.engines.registry import ENGINES, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.build import build_network
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import solve
+from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import CHOICE_RESPONSES, Limit
 from seqopt.responses import _grip_sets as division

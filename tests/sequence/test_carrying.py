@@ -13,7 +13,7 @@ from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import find_front
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm
 from seqopt.sequence.rules import FreeRules, _check_carried, _too_heavy

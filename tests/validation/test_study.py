@@ -8,7 +8,7 @@ import pytest
 
 from experiments.harness.ranks import rank_choice
 from experiments.harness.yardstick import errors, percentiles, tension_share
-from seqopt.plan.pose import pose
+from seqopt.plan.solve import pose
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.responses.table import analyze
 from seqopt.sequence.methods import METHODS

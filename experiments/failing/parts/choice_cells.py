@@ -31,7 +31,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, formulations
-from seqopt.plan.pose import pose
+from seqopt.plan.solve import pose
 from seqopt.problem.criteria import Criterion, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit

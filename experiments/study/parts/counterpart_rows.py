@@ -22,7 +22,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.pose import pose
+from seqopt.plan.solve import pose
 from seqopt.problem.problem import Problem
 from seqopt.report.comparison import Comparison, compare
 from seqopt.scene.boxes import box_corners

@@ -18,7 +18,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.instance import Instance
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import instance
-from seqopt.judge.arithmetic import first_stage
+from seqopt.judge._paths import first_stage
 from seqopt.work.progress import Tell
 
 OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")

@@ -18,7 +18,7 @@ from seqopt._cli.words import Folder
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_mortar
 from seqopt.plan.front import Front
-from seqopt.plan.pose import graph_of
+from seqopt.plan.solve import graph_of
 from seqopt.questions import pareto
 from seqopt.report._folders import figure_notes, front_counts, front_files, numbered
 from seqopt.report.comparison import shown_table

@@ -37,8 +37,7 @@ from seqopt.graph.formulation import End, Finding, FormulationKind, find_formula
 from seqopt.judge._schedules import plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.plan import Plan
-from seqopt.plan.pose import graph_of, pose
-from seqopt.plan.solve import on_the_way, solve
+from seqopt.plan.solve import graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum
 from seqopt.problem.problem import Problem
 from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
