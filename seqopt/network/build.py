@@ -16,10 +16,10 @@ from seqopt.network.network import (
     GROUND,
     DoubleCross,
     Network,
-    NodeData,
-    PartData,
     PartKind,
     Springs,
+    _NodeData,
+    _PartData,
 )
 from seqopt.scene._checks import frames
 from seqopt.scene.parts import Ground, Joint
@@ -68,7 +68,7 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ascending = np.argsort(counts, kind="stable")
     springs = [(every[i], counts[i]) for i in ascending]
     support = np.argsort(ascending)[: len(scene.grounds)]
-    return compile_network(scene, double_cross(scene, springs), springs, support)
+    return _compile(scene, _double_cross(scene, springs), springs, support)
 
 
 def network_of(given: Network | Scene) -> Network:
@@ -79,18 +79,18 @@ def network_of(given: Network | Scene) -> Network:
     raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
-def double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
+def _double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
     """Return the graph of a scene: every brick, then every spring with what it brings."""
     graph: DoubleCross = nx.DiGraph(name=scene.name)
     for i, brick in enumerate(scene.placed):
-        own = PartData(kind=PartKind.INNER, since=i + 1, spring=-1, brick=i)
+        own = _PartData(kind=PartKind.INNER, since=i + 1, spring=-1, brick=i)
         for number in brick.nodes:
-            graph.add_node(number, **NodeData(**own, position=brick.node_position(number)))
+            graph.add_node(number, **_NodeData(**own, position=brick.node_position(number)))
         graph.add_edge(*brick.nodes, **own)
     for s, (name, (spring, since)) in enumerate(zip(_joint_names(springs), springs, strict=True)):
         ends, at = [scene.since[b] for b in spring.ends], spring.position
-        own = PartData(kind=PartKind.JOINT, since=min(ends), spring=s, brick=-1)
-        graph.add_node(name, **NodeData(**own, position=at))
+        own = _PartData(kind=PartKind.JOINT, since=min(ends), spring=s, brick=-1)
+        graph.add_node(name, **_NodeData(**own, position=at))
         for count in ends:  # each brick meets it through its nearer node, or the first
             brick = scene.placed[count - 1]
             first, second = (math.dist(brick.node_position(node), at) for node in brick.nodes)
@@ -98,19 +98,19 @@ def double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
             graph.add_edge(met, name, **{**own, "since": count, "brick": count - 1})
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
-            own = PartData(kind=PartKind.BASE, since=since, spring=s, brick=-1)
-            graph.add_node(base, **NodeData(**own, position=spring.anchor))
+            own = _PartData(kind=PartKind.BASE, since=since, spring=s, brick=-1)
+            graph.add_node(base, **_NodeData(**own, position=spring.anchor))
             graph.add_edge(name, base, **own)
     nx.freeze(graph)
     return graph
 
 
-def compile_network(scene: Scene, graph: DoubleCross, springs: _Springs, support: Ints) -> Network:
+def _compile(scene: Scene, graph: DoubleCross, springs: _Springs, support: Ints) -> Network:
     """Compile a double cross to arrays; the order in which its parts were added does not matter."""
     last = {end for _, end, data in graph.edges.data() if data["kind"] is PartKind.INNER}
 
     def appears(part: tuple[Any, ...]) -> tuple[int, int, int, bool]:
-        data: PartData = part[-1]
+        data: _PartData = part[-1]
         return data["since"], data["spring"], data["kind"], part[0] in last
 
     nodes: list[Any] = sorted(graph.nodes.data(), key=appears)
@@ -119,7 +119,7 @@ def compile_network(scene: Scene, graph: DoubleCross, springs: _Springs, support
     arrays = {
         f"{what}_{key}": np.array([int(part[-1][key]) for part in parts])
         for what, parts in (("node", nodes), ("edge", edges))
-        for key in PartData.__annotations__
+        for key in _PartData.__annotations__
     }
     joint = np.flatnonzero(arrays["node_kind"] == PartKind.JOINT.value)
     ends = np.array([[index[name] for name in edge[:2]] for edge in edges])

@@ -45,7 +45,7 @@ class PartKind(IntEnum):
     BASE = 2  # fixed node of a ground end; stub that leads to it
 
 
-class PartData(TypedDict):
+class _PartData(TypedDict):
     """What the graph says of every node and edge."""
 
     kind: PartKind
@@ -54,7 +54,7 @@ class PartData(TypedDict):
     brick: int  # index in build order, of an inner node or edge and of a half-edge; -1 of others
 
 
-class NodeData(PartData):
+class _NodeData(_PartData):
     """What the graph says of a node."""
 
     position: Vector  # m

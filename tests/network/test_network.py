@@ -55,7 +55,7 @@ def test_the_graph_of_a_chain_has_closed_counts(count):
 
 @given(scene=walls() | arches(), seed=integers(0, 99))
 def test_no_array_depends_on_the_order_in_which_a_graph_is_made(scene, seed):
-    rng, made = np.random.default_rng(seed), build.double_cross
+    rng, made = np.random.default_rng(seed), build._double_cross
 
     def shuffled(*given):
         graph, out = made(*given), nx.DiGraph()
@@ -66,7 +66,7 @@ def test_no_array_depends_on_the_order_in_which_a_graph_is_made(scene, seed):
                 add(*names, **{key: data[key] for key in rng.permutation([*data])})
         return out
 
-    with patch.object(build, "double_cross", shuffled):
+    with patch.object(build, "_double_cross", shuffled):
         other = build_network(scene)
     assert other == build_network(scene)
 

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any
 
-import pandas as pd
-
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.inputs import read_steps
@@ -112,11 +110,22 @@ def _answer(
         status = Status.FAILED
     said = outputs.put_table(output.path, rows, "\n".join(lines) + ";")
     if output.path is None:
-        table = pd.DataFrame(rows).dropna(axis=1, how="all")
-        told = [name for name in table if name not in COUNTS or table[name].any()]
-        listed = table[told].to_string(index=False, na_rep="", float_format="{:.4g}".format)
-        said["text"] = "\n".join([*lines, "", listed, "", "--out FILE or --quiet: the same as CSV"])
+        said["text"] = "\n".join([*lines, "", *_listed(rows), "", "--out FILE or --quiet: as CSV"])
     return Answer(facts, **said, failures=failures, status=status)
+
+
+def _listed(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a table to read, without columns that are empty: pandas would take 0.2 s to load."""
+
+    def cell(name: str, value: Any) -> str:
+        if value is None or value != value or (name in COUNTS and not value):  # noqa: PLR0124
+            return ""
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+    columns = [[name, *(cell(name, row[name]) for row in rows)] for name in rows[0]]
+    told = [column for column in columns if any(column[1:])]
+    wide = [[text.rjust(max(map(len, column))) for text in column] for column in told]
+    return ["  ".join(line) for line in zip(*wide, strict=True)]
 
 
 def _map(
