@@ -605,7 +605,7 @@ def _limit_of(text: str, where: str) -> Limit:
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
     if name == TOLERANCE:
-        return Limit(name, length_word(value, said))
+        return Limit(name, _length_word(value, said))
     return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
 
@@ -657,7 +657,7 @@ def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) ->
     return value
 
 
-def length_word(text: str, where: str) -> float:
+def _length_word(text: str, where: str) -> float:
     """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
     unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
     return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)

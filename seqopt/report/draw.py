@@ -239,7 +239,7 @@ def draw_grips(
         robot = scene.robots[i].name
         name = f"{robot} at {grips[i]}"
         rim: Any = {"ms": 10.5, "mec": "white", "mew": 0.8}
-        mark = grip_mark(i) | rim | {"ls": "none", "zorder": 5}
+        mark = _grip_mark(i) | rim | {"ls": "none", "zorder": 5}
         axes.plot([x], [y], **mark, gid=name)
         key[i] = Line2D([], [], **mark, label=f"{robot} holds")
         if named:  # labels of neighbors stand in lines, one above the other
@@ -264,7 +264,7 @@ def _draw_robots(
         if arm is None:
             continue
         points = arm.line if isinstance(arm, PosedArm) else arm
-        color = grip_mark(i)["color"]
+        color = _grip_mark(i)["color"]
         order = 4.0 if (points[0] - cell.middle) @ toward > 0 else 0.5
         bodies = [body @ view.axes().T for body in arm.bodies] if isinstance(arm, PosedArm) else []
         for body in sorted(bodies, key=lambda body: float(body[:, 2].mean())):  # farthest first
@@ -295,7 +295,7 @@ def _draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View
         axes.plot(x[:1], y[:1], **PROP_MARK, ms=7, zorder=4.5)
 
 
-def grip_mark(robot: int) -> dict[str, Any]:
+def _grip_mark(robot: int) -> dict[str, Any]:
     """Return color and shape of the mark of a robot's grip."""
     color, marker = (each[robot % len(each)] for each in (ROBOT_COLORS, ROBOT_MARKERS))
     return {"color": color, "marker": marker}

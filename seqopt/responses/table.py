@@ -128,7 +128,7 @@ def _table_of(columns: _Columns) -> pd.DataFrame:
     return pd.DataFrame(filled)
 
 
-def held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
+def _held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
     """Return number, bricks and grips of every step of a table of `analyze`."""
     steps = _steps_in_table(scene, table)
     return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
@@ -395,7 +395,7 @@ class LinearRange:
 
     def _measured(self, *tables: _Columns) -> Floats:
         """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
-        every = [held_in_table(self._network.scene, table) for table in tables]
+        every = [_held_in_table(self._network.scene, table) for table in tables]
         keys = [(bricks, held) for _, bricks, held in chain.from_iterable(every)]
         if isinstance(self._engine, OpeningEngine):
             return np.full((len(keys), 4), -np.inf)  # far motions are unstable
@@ -524,7 +524,7 @@ def _left_out(within: LinearRange, builds: Mapping[str, _Columns]) -> Iterator[s
     yield "motion in time"
 
 
-def each_tolerance(
+def _each_tolerance(
     engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
 ) -> Floats:
     """Return the tolerance of grips of every step, m; those alike are solved as one batch.
@@ -556,8 +556,8 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     )
     if any((np.abs(np.asarray(force)) > robot.payload).any() for robot, force in carried):
         return ""
-    held = {name: held_in_table(scene, table) for name, table in builds.items()}
-    found = each_tolerance(within.engine, [*chain.from_iterable(held.values())], within.offs)
+    held = {name: _held_in_table(scene, table) for name, table in builds.items()}
+    found = _each_tolerance(within.engine, [*chain.from_iterable(held.values())], within.offs)
     at = int(found.argmin())
     if not 0 < found[at] < np.inf:  # two rigid grips on one brick have no tolerance
         return ""
