@@ -49,7 +49,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
-from seqopt.stability.standing import Standing, StandingSets, as_standing
+from seqopt.stability.standing import Standing, StandingSets
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
@@ -633,7 +633,7 @@ def build_states(
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)
-    return _asked(States(engine, rules, criterion, named, limits, as_standing(stands)))
+    return _asked(States(engine, rules, criterion, named, limits, Standing.of(stands)))
 
 
 def within(problem: States, caps: Mapping[Amount | str, float]) -> States:

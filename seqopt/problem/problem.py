@@ -39,7 +39,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.stability.standing import Standing, as_standing
+from seqopt.stability.standing import Standing
 
 
 class Aim(Enum):
@@ -384,7 +384,7 @@ READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
     "limits": as_limits,
     "budgets": parse_budgets,
-    "stands": as_standing,
+    "stands": Standing.of,
     "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
     "over": parse_robust,
     "orders": lambda given: None if given is None else Orders.of(given),

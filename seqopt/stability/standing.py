@@ -65,6 +65,11 @@ class Standing:
         if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 
+    @classmethod
+    def of(cls, given: Standing | Mortar | str | None) -> Standing | None:
+        """Return a requirement that is given as such, or by its mortar."""
+        return given if isinstance(given, Standing | None) else cls(find_mortar(given))
+
     def demanding(self, name: str, value: float) -> Standing:
         """Return the requirement of one margin alone, no worse than a value as goals count it."""
         if name == "tilt":
@@ -97,11 +102,6 @@ class Standing:
             "tilt_deg": degrees(self.tilt),
             **({} if self.curing is None else {"curing": str(self.curing)}),
         }
-
-
-def as_standing(given: Standing | Mortar | str | None) -> Standing | None:
-    """Return a requirement that is given as such, or by its mortar."""
-    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
 
 
 def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
