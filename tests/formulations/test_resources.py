@@ -115,7 +115,7 @@ def test_it_is_asked_for_by_its_name():
     seqopt.register(heat("free"))
     problem = posed("free").but(limits="heat")
     assert [*map(str, problem.paths)] == ["heat"]
-    assert "1 paths" in repr(problem)
+    assert "1 path)" in repr(problem)
     plan = seqopt.solve(problem)
     assert plan.summary()["resources"] == ["heat"]
 
