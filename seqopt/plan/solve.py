@@ -86,7 +86,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     >>> engine = seqopt.make_engine("auto", seqopt.load_scene("arch25"))
     >>> worst = seqopt.CRITERIA["worst-ratio"]
     >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
-    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
+    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budget)
     """
     asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
