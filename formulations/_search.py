@@ -424,13 +424,13 @@ def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Sol
 
     Also None if a goal is then above ``most``.
     """
-    worst = np.full(len(problem.goals), -np.inf)
+    worst, peak = np.full(len(problem.goals), -np.inf), problem.goals[0].is_peak
     own = problem.at(one.order if one else ())
     for level, same in groupby(one.states if one else (), key=itemgetter(0)):
-        values, allowed = own.values(level, np.array([state for _, *state in same]))
-        if not allowed.all():
-            return None
+        values, allowed = own.values(level, np.array([state for _, *state in same]), most=most[0])
         worst = np.maximum(worst, values.max(axis=0))
+        if not allowed.all() or (peak and worst[0] > most[0]):
+            return None
     if one is None:
         return None
     pairs = zip(problem.goals, worst.tolist(), one.objective, strict=False)

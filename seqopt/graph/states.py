@@ -41,7 +41,7 @@ from seqopt.problem.problem import (
     robot_responses,
 )
 from seqopt.problem.requirements import Filter, Limit, Resource, filters_of
-from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, _near
+from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, ScenarioSets, _near
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Order, Scene
@@ -91,7 +91,7 @@ class States(Shown):
     filters: tuple[Filter, ...] = ()
     orders: Orders | None = None
     paths: tuple[Resource, ...] = ()
-    answers: dict[object, GripSets] = field(default_factory=dict, compare=False)
+    answers: dict[object, Any] = field(default_factory=dict, compare=False)
     judged: dict[object, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -315,7 +315,8 @@ class States(Shown):
         key = id(self.engine), names, screen
         if key not in self.answers:
             self.answers[key] = GripSets(self.engine, names, self.resources, screen=screen)
-        return self.answers[key]
+        found: GripSets = self.answers[key]
+        return found
 
     @property
     def models(self) -> int:
@@ -454,7 +455,7 @@ class States(Shown):
         """
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
-            return self._worst(asked, states, most)
+            return self._worst(asked, level, states, most, rough=rough)
         bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
         if not bricks:  # the empty site, where a take-down ends
@@ -484,7 +485,7 @@ class States(Shown):
         """
         if self.each:
             asked = [partial(p.standing_values, level) for p in self.each]
-            return self._worst(asked, states, most)
+            return self._worst(asked, level, states, most)
         out, within = self.values(level, states)
         if self.demands:
             rows = np.flatnonzero(within)
@@ -513,17 +514,42 @@ class States(Shown):
         return self.stability.recalled(bricks, *self.held_to_stand(states))
 
     def _worst(
-        self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
+        self,
+        valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]],
+        level: int,
+        states: Ints,
+        most: float,
+        *,
+        rough: bool = False,
     ) -> tuple[Floats, Bools]:
-        """Return values (n, g) over scenarios, evaluated where none before excludes the state."""
+        """Return values (n, g) over scenarios, evaluated where none before excludes the state.
+
+        The responses of one scenario, then of three, nine and so on are computed together.
+        """
         out = np.zeros((len(states), len(self.goals)))
-        within = np.ones(len(states), dtype=bool)
+        within, ahead = np.ones(len(states), dtype=bool), 0
         for number, values in enumerate(valued):
             rows = np.flatnonzero(within & (out[:, 0] <= most))
+            if not len(rows):
+                break
+            if number == ahead:
+                ahead = min(3 * number + 1, len(valued))
+                self._fill(range(number, ahead), level, states[rows], rough=rough)
             found, ok = values(states[rows])
             out[rows], within[rows] = self.joined(out[rows], found, number), ok
         out[~within] = np.inf
         return out, within
+
+    def _fill(self, parts: Sequence[int], level: int, states: Ints, *, rough: bool) -> None:
+        """Compute the responses of states in some scenarios, by number, together."""
+        bricks = self.space.bricks_at(level)
+        if len(parts) > 1 and bricks and not self.each[0]._by_candidates:
+            sets = [one.screened if rough else one.sets for one in self.each]
+            key = "together", *map(id, self.scenarios)
+            if key not in self.answers:
+                self.answers[key] = ScenarioSets(self.scenarios, self.resources)
+            held, _ = _ascending(self.each[0]._columns(states), self._caps)
+            self.answers[key].fill(parts, sets, bricks, held)
 
     def joined(self, before: Floats, values: Floats, number: int) -> Floats:
         """Return values (n, g) over scenarios with those of one more, the scenario of a number."""

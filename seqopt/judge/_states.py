@@ -19,7 +19,7 @@ from seqopt.judge._rule_moves import Choices, RuleTables, ScheduleTables, Transi
 from seqopt.judge.certificate import _own_values, _twin_of, exceeds
 from seqopt.problem.amounts import LARGEST, NONE, MoveArrays, StateArrays
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.responses._grip_sets import Block, solve_sets
+from seqopt.responses._grip_sets import Block, ScenarioSets, solve_sets
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import Scene
@@ -34,12 +34,16 @@ Responses = Mapping[str, Floats]
 _Table = tuple[Ints, Floats, Bools]  # codes of choices, values of goals, and what keeps limits
 
 
-def _solve(problem: States, bricks: int, grips: Ints) -> Floats:
-    """Return the named responses of grip sets (S, r), and then the forces of their grips."""
+def _block(problem: States, bricks: int, grips: Ints) -> Block:
+    """Return the question for the named responses of grip sets (S, r)."""
     names = tuple(name for name in problem.named if name != LARGEST)
     props = tuple(n for n, _ in props_that_hold(problem.network.scene, bricks, grips.shape[1]))
-    block = Block(bricks, grips, names, screen=False, props=props)
-    return solve_sets(problem.engine, block, problem.resources)
+    return Block(bricks, grips, names, screen=False, props=props)
+
+
+def _solve(problem: States, bricks: int, grips: Ints) -> Floats:
+    """Return the named responses of grip sets (S, r), and then the forces of their grips."""
+    return solve_sets(problem.engine, _block(problem, bricks, grips), problem.resources)
 
 
 def _by_name(problem: States, rows: Floats) -> tuple[dict[str, Floats], Floats]:
@@ -109,6 +113,7 @@ class StateEvaluator:
         twins = (_twin_of(goal) for goal in problem.goals if not goal.is_peak)
         self._to_go = next((twin.to_go for twin in twins if twin and twin.to_go), None)
         self._levels = LevelTables(self)
+        self._together = ScenarioSets(problem.scenarios, problem.resources)
         self._models = 0
 
     @property
@@ -263,22 +268,32 @@ class StateEvaluator:
         problem = self.problem
         if not problem.each:
             self._models += len(grips)
-            return self._ask_engine(problem, bricks, grips)
-        values = np.zeros((len(grips), len(problem.goals)))
+            return self._ask_engine(problem, bricks, grips, _solve(problem, bricks, grips))
+        values, ahead = np.zeros((len(grips), len(problem.goals))), 0
         forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
         for number, each in enumerate(problem.each):
             rows = np.flatnonzero(fit & (values[:, 0] <= most))
-            own, borne, fit[rows] = self._ask_engine(each, bricks, grips[rows])
+            if not len(rows):
+                break
+            if number == ahead:  # of one scenario, then of three, nine and so on together
+                ahead, base = min(3 * number + 1, len(problem.each)), rows
+                block = _block(each, bricks, grips[rows])
+                known = self._together.solve(range(number, ahead), block)
+            if number in known:
+                found = known[number][np.searchsorted(base, rows)]
+            else:
+                found = _solve(each, bricks, grips[rows])
+            own, borne, fit[rows] = self._ask_engine(each, bricks, grips[rows], found)
             values[rows] = problem.joined(values[rows], own, number)
             forces[rows] = np.maximum(forces[rows], borne)
             self._models += len(rows)
         return values, forces, fit
 
     def _ask_engine(
-        self, problem: States, bricks: int, grips: Ints
+        self, problem: States, bricks: int, grips: Ints, rows: Floats
     ) -> tuple[Floats, Floats, Bools]:
-        rows, scene = _solve(problem, bricks, grips), problem.network.scene
-        found, forces = _by_name(problem, rows)
+        """Return the same of one scenario; ``rows``: as of `_solve`."""
+        (found, forces), scene = _by_name(problem, rows), problem.network.scene
         fit = np.asarray(np.isfinite(rows).all(axis=1))
         for limit in problem.limits:
             fit &= ~exceeds(limit, found.get(limit.response, np.zeros(len(grips))))

@@ -12,14 +12,15 @@ import threading
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import or_
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, KnownRows
 from seqopt.engines.interface import Engine, Want, linear_limit
 from seqopt.engines.registry import Recipe, recipe_of
@@ -38,6 +39,8 @@ from seqopt.responses.quantities import (
 from seqopt.sequence.steps import Step
 from seqopt.work._workers import hire, map_ordered, one_thread
 from seqopt.work.progress import Progress, Tell
+
+_STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
 COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
 # Engines of the last two runs of each thread of a worker: executors of users have no storage for
@@ -125,8 +128,7 @@ class Answers(FrozenValue):
 
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states. Raises what the engine does."""
-    asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
-    want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
+    want = _want(block)
     sets, robots = block.grips.shape
     grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
@@ -138,6 +140,7 @@ def answer(engine: Engine, block: Block) -> Answers:
         fields = engine.solve(block.bricks, grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
     network, bricks = engine.network, block.bricks
+    asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     if TOLERANCE in block.names:
         with one_thread():
@@ -146,6 +149,12 @@ def answer(engine: Engine, block: Block) -> Answers:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
     return Answers(values, forces)
+
+
+def _want(block: Block) -> Want:
+    """Return the fields from which the responses of a block follow."""
+    needs = (CHOSEN_BY[name].needs for name in block.names if name in CHOSEN_BY)
+    return reduce(or_, needs, Want.SCREEN if block.screen else Want(0))
 
 
 def packed(engine: Engine) -> bytes:
@@ -249,17 +258,22 @@ class GripSets:
         """Return responses and forces (S, R + r) of grips (S, r); those not cached are solved."""
 
         def solve(new: Ints) -> Floats:
-            grips = every[new]
-            props = self._engine.network.scene.prop_numbers(bricks, held=bool(every.shape[1]))
-            self._work += work(len(grips), bricks)
-            compiled = self._work >= COMPILED
-            sets = Block(bricks, grips, self.names, self._screen, props, compiled)
+            sets = self._block(bricks, every[new])
             return solve_sets(self._engine, sets, self._resources, loose=self._loose)
 
-        codes = np.zeros(len(every), dtype=np.int64)  # a number for every set of its own
+        return self._known.of((bricks, every.shape[1]), self._codes(every), solve)
+
+    def _codes(self, every: Ints) -> Ints:
+        """Return a number (S,) for every grip set (S, r) of its own."""
+        codes = np.zeros(len(every), dtype=np.int64)
         for column in every.T:
             codes = codes * (self._number.max() + 1) + column
-        return self._known.of((bricks, every.shape[1]), codes, solve)
+        return codes
+
+    def _block(self, bricks: int, grips: Ints) -> Block:
+        props = self._engine.network.scene.prop_numbers(bricks, held=bool(grips.shape[1]))
+        self._work += work(len(grips), bricks)
+        return Block(bricks, grips, self.names, self._screen, props, self._work >= COMPILED)
 
 
 def solve_sets(
@@ -303,6 +317,55 @@ def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
     parts = [_answer(engine, replace(block, grips=half), loose=True) for half in halves]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in block.names}
     return Answers(values, np.concatenate([part.forces for part in parts]))
+
+
+class ScenarioSets:
+    """Grip sets of one structure in several scenarios, solved in batches over all of them.
+
+    ``engines``: one for every scenario. Nothing is solved together where engines are others than
+    compliance, or processes share the work.
+    """
+
+    def __init__(self, engines: Sequence[Engine], resources: Resources = HERE) -> None:
+        alone = resources.executor is None and resources.workers == 1
+        own = [each for each in engines if type(each) is ComplianceEngine]
+        self._stacked: Any = None
+        if alone and len(own) == len(engines) > 1:
+            self._stacked = _STACKED.StackedEngines(own)
+
+    def solve(self, parts: Sequence[int], block: Block) -> dict[int, Floats]:
+        """Return responses and forces (S, R + r) by scenario; nothing that is not solved together.
+
+        ``parts``: numbers of scenarios.
+        """
+        stacked, names = self._stacked, block.names
+        sets, robots = block.grips.shape
+        grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
+        able = stacked is not None and sets and grips.shape[1] and EXTREMES.keys() >= {*names}
+        if not able or not stacked.fits(block.bricks):
+            return {}
+        out = dict[int, Floats]()
+        with suppress(MechanismError), one_thread():  # which sets are loose is found one by one
+            for k, found in zip(
+                parts, stacked.extremes(parts, block.bricks, grips, _want(block)), strict=True
+            ):
+                forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
+                out[k] = np.column_stack([*(EXTREMES[name](found) for name in names), forces])
+        return out
+
+    def fill(self, parts: Sequence[int], sets: Sequence[GripSets], bricks: int, held: Ints) -> None:
+        """Solve places held (S, r) for the caches of several scenarios; ``sets``: of all."""
+        if self._stacked is None or len(parts) < 2:
+            return
+        first, grips = sets[parts[0]], (held > 0).sum(axis=1)
+        for count in np.unique(grips).tolist():
+            every = first._number[held[grips == count, held.shape[1] - count :]]
+            codes = first._codes(every)
+            _, new = np.unique(codes, return_index=True)
+            new = new[np.isnan(first._known.known((bricks, count), codes[new]))]
+            found = self.solve(parts, first._block(bricks, every[new]))
+            for k, rows in found.items():
+                sets[k]._known.of((bricks, count), codes[new], rows.__getitem__)
 
 
 class Moved(NamedTuple):

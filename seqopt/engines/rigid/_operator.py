@@ -201,10 +201,15 @@ class ComplianceOperator(FrozenValue):
         out[self.held] = np.arange(len(self.held))
         return frozen(out)
 
+    @property
+    def inner(self) -> tuple[Ints, Floats]:
+        """The inner edges of bricks (b,), and unit vectors along them (b, 3)."""
+        return self.maps.inner[:2]
+
     @cached_property
     def across(self) -> Floats:
         """Unit vectors from each inner node to the other of its brick, (2b, d)."""
-        axis = self.maps.inner[1]
+        axis = self.inner[1]
         return frozen(np.stack([axis, -axis], axis=1).reshape(-1, 3))
 
     @cached_property
@@ -224,12 +229,20 @@ class ComplianceOperator(FrozenValue):
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return rows
 
+    def entries(self, rows: Ints) -> Ints:
+        """Return where the flexibility has entries of loads (k, S), (k, k, S)."""
+        return np.asarray(rows[:, None] * len(self.flexibility) + rows)
+
+    def weight_rows(self, index: Ints) -> Ints | int:
+        """Return which row is the weight, of sets with loads (S, k)."""
+        return len(self.twist) - 1
+
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> sparse.csr_array:
         """Return forces (S, k) at loads (S, k) and a share of the weight as a matrix (S, l + 1)."""
         (sets, loads), count = index.shape, len(self.twist)
         rows, share = np.empty((sets, loads + 1), dtype=np.int32), np.empty((sets, loads + 1))
         rows[:, :-1], share[:, :-1] = index, force
-        rows[:, -1], share[:, -1] = count - 1, weight
+        rows[:, -1], share[:, -1] = self.weight_rows(index), weight
         first = np.arange(0, rows.size + 1, loads + 1, dtype=np.int32)
         return sparse.csr_array((share.ravel(), rows.ravel(), first), shape=(sets, count))
 
@@ -272,8 +285,12 @@ class ComplianceOperator(FrozenValue):
 
     def of_loads(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), made when first asked for."""
-        if name in self._made:
-            return self._made[name]
+        if name not in self._made:
+            self._made[name] = frozen(self._of_loads(name))
+        return self._made[name]
+
+    def _of_loads(self, name: str) -> Floats:
+        """Return a field under every load, (l + 1, Q), which is not kept."""
         out = self.maps.apply(name, self._states(name))
         if name == "edge_force":
             edge, axis, pull = self.maps.inner
@@ -283,7 +300,6 @@ class ComplianceOperator(FrozenValue):
             out[rows, edge[self.held][:, None]] += axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
-        self._made[name] = frozen(out)
         return out
 
     @cached_property
@@ -521,7 +537,7 @@ def share_pairs(
     """
     if not len(pairs.sets):
         return
-    sets, edges = pairs.sets, operator.maps.inner[0][pairs.brick]
+    sets, edges = pairs.sets, operator.inner[0][pairs.brick]
     if carried.shape[1]:
         between = carried[sets, edges]
         carried[sets, edges] = 0.0
@@ -547,10 +563,10 @@ def undone(
     much grips already let their nodes move, where they bear something.
     """
     count, sets = rows.shape
-    size = len(operator.flexibility)
     system = np.empty((count + 1, count, sets))
-    entries = rows[:, None] * size + rows
-    operator.flexibility.take(entries, out=system[:count], mode="clip")  # others copy once more
+    operator.flexibility.take(
+        operator.entries(rows), out=system[:count], mode="clip"
+    )  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     nodes = count - operator.loose
