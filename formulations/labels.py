@@ -32,11 +32,10 @@ costs and takes; those are continued that may become better than the best path k
 
 from __future__ import annotations
 
-from formulations.on_graph import Choice, on_graph, shortest
+from formulations.on_graph import Choice, on_graph, within_caps
 from seqopt.errors import ProblemError
-from seqopt.graph._budgets import within_budgets
 from seqopt.graph.formulation import FormulationKind, Watch
-from seqopt.graph.graph import Graph, strictly_below
+from seqopt.graph.graph import Graph
 from seqopt.problem.problem import Aim
 
 
@@ -47,22 +46,7 @@ def _exact(graph: Graph, watch: Watch, *, most: int = 20_000) -> Choice:
     """
     if most < 1:
         raise ProblemError(f"labels: most is {most}; give a whole number from 1")
-    return _chosen(graph, watch, most)
-
-
-def relaxed(graph: Graph, watch: Watch) -> Choice:
-    """Return the incumbent with the Lagrangian bounds; exact without budgets."""
-    return _chosen(graph, watch, 0)
-
-
-def _chosen(graph: Graph, watch: Watch, most: int) -> Choice:
-    if not graph.caps:
-        return shortest(graph, watch)
-    found = within_budgets(graph, graph.caps, watch, most)
-    goals = zip(found.values[: graph.goals], found.bounds, strict=False)
-    is_open = any(bound < strictly_below(value) for value, bound in goals)
-    stopped = watch.over or (most > 0 and is_open)
-    return Choice(found.path, found.bounds[: graph.goals], stopped, found.prices)
+    return within_caps(graph, watch, most)
 
 
 LABELS = on_graph(
@@ -71,7 +55,7 @@ LABELS = on_graph(
 LAGRANGIAN = on_graph(
     "lagrangian",
     "full overlap, multipliers of budgets",
-    relaxed,
+    within_caps,
     FormulationKind.BOUND,
     aim=Aim.SUM,
     takes_budgets=True,

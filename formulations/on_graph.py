@@ -32,7 +32,7 @@ from formulations._search import (
 )
 from seqopt.arrays import Floats, Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
+from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, within_budgets
 from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
 from seqopt.graph._spaces import build_space, explore
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
@@ -46,6 +46,7 @@ from seqopt.graph.graph import (
     lexicographic,
     moves_along,
     path_values,
+    strictly_below,
     tied,
 )
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
@@ -121,6 +122,20 @@ def shortest(graph: Graph, watch: Watch) -> Choice:
     if watch.over:
         return Choice(at_hand(graph), stopped=True)
     return Choice(*lexicographic(graph))
+
+
+def within_caps(graph: Graph, watch: Watch, most: int = 0) -> Choice:
+    """Return the best path met within caps, with Lagrangian bounds; exact without caps.
+
+    ``most``: how many labels may be kept to close the gap of a sum.
+    """
+    if not graph.caps:
+        return shortest(graph, watch)
+    found = within_budgets(graph, graph.caps, watch, most)
+    goals = zip(found.values[: graph.goals], found.bounds, strict=False)
+    is_open = any(bound < strictly_below(value) for value, bound in goals)
+    stopped = watch.over or (most > 0 and is_open)
+    return Choice(found.path, found.bounds[: graph.goals], stopped, found.prices)
 
 
 def best_total(

@@ -46,8 +46,7 @@ halving an interval, and all further states must have it.
 from __future__ import annotations
 
 from formulations._search import Options, Watching, after_margins, search_states
-from formulations.labels import relaxed
-from formulations.on_graph import Choice, best_total, on_graph, shortest
+from formulations.on_graph import Choice, best_total, on_graph, shortest, within_caps
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import Graph
@@ -62,7 +61,7 @@ def choose(graph: Graph, watch: Watch, *, width: int = 50, growth: float = 1.1) 
     none.
     """
     _require_options(width, growth)
-    return relaxed(graph, watch)
+    return within_caps(graph, watch)
 
 
 def _of_states(

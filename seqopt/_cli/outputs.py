@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._files import csv_text, require_apart, require_folder, write_folder, write_text
-from seqopt._showing import PAGE
+from seqopt._files import PAGE, csv_text, require_apart, require_folder, write_folder, write_text
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE

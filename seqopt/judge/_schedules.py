@@ -19,6 +19,7 @@ from operator import or_
 
 import numpy as np
 
+from seqopt._registry import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine, Fields, Want, linear_limit
 from seqopt.errors import SolverError, StepError
@@ -41,10 +42,10 @@ from seqopt.scene.scene import Order, _check_postures
 from seqopt.sequence.rules import _check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability._steps import each_stability, step_verdicts
 from seqopt.stability.assessment import MARGINS, Stability, Verdict
 from seqopt.stability.standing import Standing, _size, slack
 
+STEPS = Later("seqopt.stability._steps")  # where states must stand
 ENDED = ("time", "memory", "interrupt")  # searches that were stopped: no bound is proven
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 _UNFELT = 1e-3  # of the mean weight of a brick, far more than forces err
@@ -430,7 +431,7 @@ def proven_margins(
         least = (standing or Standing()).tilt - SURE
         stand = [r.verdict is Verdict.STANDS and not r.tilt < least for r in results]
     elif standing is not None:
-        verdicts = step_verdicts(problem.network, steps, standing.mortar)
+        verdicts = STEPS.step_verdicts(problem.network, steps, standing.mortar)
         said, stand = [v.value for v in verdicts], [v is Verdict.STANDS for v in verdicts]
     for step, what, does in zip(steps, said, stand, strict=bool(said)):
         if standing is not None and not does:
@@ -451,6 +452,6 @@ def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
     mortar = (problem.standing or Standing()).mortar
     for step in steps:
         if (step.bricks, step.grips) not in problem.certified:
-            (result,) = each_stability(problem.network, [step], mortar, MARGINS)
+            (result,) = STEPS.each_stability(problem.network, [step], mortar, MARGINS)
             problem.certified[step.bricks, step.grips] = result
     return tuple(problem.certified[step.bricks, step.grips] for step in steps)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from seqopt._registry import Shown, display, offered
-from seqopt._showing import Page
+from seqopt._registry import Later, Shown, display, offered
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
@@ -29,14 +28,15 @@ from seqopt.responses.table import (
     what_was_enough,
 )
 from seqopt.sequence.steps import Site, Step, _check_part
-from seqopt.stability._steps import assess_steps, stability_table, step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.standing import Standing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from seqopt._showing import Page
+    from seqopt._files import Page
+
+STEPS = Later("seqopt.stability._steps")  # where it is asked whether steps stand
 
 
 class ShownBuild(Shown):
@@ -96,12 +96,15 @@ class ShownBuild(Shown):
         Margins take ten times as long as `verdicts` alone. Movements of the ground enter neither.
         Result: as of `seqopt.stability._steps.stability_table`.
         """
-        results = assess_steps(self.engine.network, self.steps, mortar, MARGINS)
-        return stability_table(self.steps, results)
+        results = STEPS.assess_steps(self.engine.network, self.steps, mortar, MARGINS)
+        table: pd.DataFrame = STEPS.stability_table(self.steps, results)
+        return table
 
     def verdicts(self, mortar: Mortar | str = "dry") -> tuple[Verdict, ...]:
         """Return whether every step stands, without margins: in seconds; ``bond=PASCAL``, too."""
-        return step_verdicts(self.engine.network, self.steps, find_mortar(mortar))
+        asked = self.engine.network, self.steps, find_mortar(mortar)
+        found: tuple[Verdict, ...] = STEPS.step_verdicts(*asked)
+        return found
 
     def props(self) -> pd.DataFrame:
         """Return the forces of all props of the scene, and the steps in which they act.

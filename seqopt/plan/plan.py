@@ -44,11 +44,11 @@ from seqopt.responses.table import (
 )
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
-from seqopt.stability._steps import stability_table
 from seqopt.stability.standing import Standing
 from seqopt.work.progress import Tell
 
 PROOFS = Later("seqopt.judge._schedules")  # 20 ms
+STEPS = Later("seqopt.stability._steps")  # where it is asked whether steps stand
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
 
@@ -330,7 +330,9 @@ class Plan(ShownBuild):
         `seqopt.stability._steps.stability_table`.
         """
         if mortar is None and self.standing is not None:
-            return stability_table(self.steps, PROOFS.certified(self.states, self.steps))
+            results = PROOFS.certified(self.states, self.steps)
+            table: pd.DataFrame = STEPS.stability_table(self.steps, results)
+            return table
         return super().stability("dry" if mortar is None else mortar)
 
     def summary(self) -> dict[str, object]:

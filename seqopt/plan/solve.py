@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar
@@ -28,12 +28,14 @@ from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, 
 from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, require_parts
 from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
 from seqopt.scene.arm import from_arms
-from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
 from seqopt.work.progress import INTERRUPT
+
+if TYPE_CHECKING:
+    from seqopt.scene.scenarios import Scenarios
 
 ANSWERS, PROOFS = Later("seqopt.plan._answers"), Later("seqopt.judge._schedules")  # 20 ms
 ORDERS = Later("seqopt.graph._spaces")  # few problems seek an order

@@ -9,9 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._files import csv_text
+from seqopt._files import PAGE, csv_text
 from seqopt._registry import Later
-from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_in_postures, tasks_json

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from seqopt._files import Page
 from seqopt._registry import display
-from seqopt._showing import Page
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError

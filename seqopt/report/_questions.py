@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from seqopt._showing import Page
+from seqopt._files import Page
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_mortar, find_engine
 from seqopt.errors import ProblemError

@@ -6,7 +6,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from seqopt._showing import Page
+from seqopt._files import Page
 from seqopt.errors import ExtraError
 
 

@@ -16,9 +16,14 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 `load_factors` finds the largest multiple of the scene's loads that every step bears.
 """
 
-from seqopt.stability._screens import Margins, Screen
-from seqopt.stability._steps import assess_steps, stability_table
-from seqopt.stability.assessment import LoadFactor, Stability, Verdict, assess, load_factors
+from typing import TYPE_CHECKING
+
+from seqopt._registry import later
+
+if TYPE_CHECKING:
+    from seqopt.stability._screens import Margins, Screen
+    from seqopt.stability._steps import assess_steps, stability_table
+    from seqopt.stability.assessment import LoadFactor, Stability, Verdict, assess, load_factors
 
 __all__ = [
     "LoadFactor",
@@ -31,3 +36,7 @@ __all__ = [
     "load_factors",
     "stability_table",
 ]
+HOMES = dict.fromkeys(__all__, "assessment")
+HOMES |= dict.fromkeys(["Margins", "Screen"], "_screens")
+HOMES |= dict.fromkeys(["assess_steps", "stability_table"], "_steps")
+__getattr__, __dir__ = later(__name__, HOMES)

@@ -33,7 +33,7 @@ from seqopt.errors import GripError, SceneError, plugins
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.stability.assessment import ROUGHEST, bonded
+from seqopt.stability.assessment import FALLS, OPEN, ROUGHEST, STANDS, bonded
 from seqopt.stability.limit_analysis import (
     CAP,
     DIRECTIONS,
@@ -69,7 +69,6 @@ _TIGHT = 1e-8  # largest violation of forces that prove, over the force scale an
 _IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 _Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
-STANDS, FALLS, OPEN = 1, -1, 0
 _FIRST = tuple(range(0, FINE, FINE // 4))
 _FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
 _TURN = 2 * np.pi / FINE

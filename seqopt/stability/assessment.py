@@ -41,6 +41,7 @@ from seqopt.stability.limit_analysis import (
 )
 from seqopt.work.progress import Tell, with_progress
 
+STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
 CONES = "cone program"  # what proves a verdict where nothing simpler does
 MARGINS = ("bond", "friction", "tilt", "payload")
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none

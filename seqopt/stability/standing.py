@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from math import degrees, pi
 from operator import le
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints, KnownRows
 from seqopt.contact.mortar import (
     DRY,
@@ -23,7 +25,12 @@ from seqopt.contact.mortar import (
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
-from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Proofs, Screen
+from seqopt.stability.assessment import FALLS, OPEN, STANDS
+
+if TYPE_CHECKING:
+    from seqopt.stability._screens import Screen
+
+SCREENS = Later("seqopt.stability._screens")  # where states must stand
 
 MARGINS = ("bond", "friction", "tilt")
 """Margins of stability that goals minimize: the least bond (Pa, in tension, with that times
@@ -132,9 +139,9 @@ class StandingSets:
             )
         self._demands = demands = _without_implied(demands or (standing,))
         self._network, self._mortar = network, standing.mortar
-        self._proofs, self._others = Proofs(), list[StandingSets]()
+        self._proofs, self._others = SCREENS.Proofs(), list[StandingSets]()
         self._screens = self._screened()
-        self._margins = Margins(network, standing.mortar)
+        self._margins = SCREENS.Margins(network, standing.mortar)
         self._tilts_known: dict[int, Screen] = {}
         self._known: Mapping[str, KnownRows] = {name: KnownRows() for name in ("", *MARGINS)}
         self._most = 1 + 2 * len(network.inner)
@@ -143,7 +150,7 @@ class StandingSets:
     def _screened(self) -> list[Screen]:
         proofs = self._proofs
         return [
-            Screen(self._network, demand.mortar, demand.tilt, proofs=proofs)
+            SCREENS.Screen(self._network, demand.mortar, demand.tilt, proofs=proofs)
             for demand in self._demands
         ]
 
@@ -165,7 +172,8 @@ class StandingSets:
     @property
     def programs(self) -> int:
         """Number of linear programs solved."""
-        return self._screens[0].solved + self._margins.solved
+        found: int = self._screens[0].solved + self._margins.solved
+        return found
 
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
@@ -231,7 +239,7 @@ class StandingSets:
                 for step in np.unique(middle[left]).tolist():
                     rows = np.flatnonzero(left & (middle == step))
                     if step not in self._tilts_known:
-                        self._tilts_known[step] = Screen(
+                        self._tilts_known[step] = SCREENS.Screen(
                             self._network, self._mortar, step * STEP, proofs=self._proofs
                         )
                     found = self._tilts_known[step].stands(bricks, held[rows], payload[rows])

@@ -19,8 +19,7 @@ from hypothesis import given, settings
 import seqopt
 from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
-from seqopt._files import csv_text
-from seqopt._showing import Page
+from seqopt._files import Page, csv_text
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError

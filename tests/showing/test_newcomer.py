@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 import seqopt
+from seqopt._files import Page
 from seqopt._registry import OFFERS, VIEWS, display
-from seqopt._showing import Page
 from seqopt.errors import ExtraError
 from seqopt.plan.plan import Plan
 from seqopt.problem.amounts import Amount

@@ -38,7 +38,6 @@ from seqopt.engines.interface import (
     require_finite,
 )
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mixed import LAST_CORRECTION, Shared, share
 from seqopt.engines.rigid._operator import (
     ComplianceOperator,
     OperatorBuilder,
@@ -57,11 +56,13 @@ from seqopt.work._workers import one_thread
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes
     from seqopt.engines.rigid._frontal import FrontalSystem
+    from seqopt.engines.rigid._mixed import Shared
     from seqopt.engines.rigid._refinement import Refinement
 
 _EXTREMES = Later("seqopt.engines.rigid._extremes")  # with numba alone
 _FRONTAL = Later("seqopt.engines.rigid._frontal")  # of large scenes alone
 _REFINEMENT = Later("seqopt.engines.rigid._refinement")  # few sets need any
+_MIXED = Later("seqopt.engines.rigid._mixed")  # with these alone
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
@@ -221,7 +222,7 @@ class ComplianceEngine(NamedEngine):
         size = len(self.network.inner)
         if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
-                last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
+                last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
                 answer = self._frontal.solve(bricks, columns, compliance, last)
                 return keep_wanted(answer, want)
         fast: _FastSolution | None = None
@@ -304,7 +305,8 @@ class ComplianceEngine(NamedEngine):
     @cached_property
     def _shared(self) -> Shared:
         """What the systems that correct answers are cut from."""
-        return share(self.network)
+        found: Shared = _MIXED.share(self.network)
+        return found
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -327,6 +329,6 @@ class ComplianceEngine(NamedEngine):
                 self._refinement = _REFINEMENT.Refinement(
                     self.network, bricks, self._shared, tied=tied
                 )
-            last = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
+            last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
