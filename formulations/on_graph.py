@@ -37,10 +37,13 @@ from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
 from seqopt.graph._spaces import build_space, explore
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
 from seqopt.graph.graph import (
+    TAIL,
     Best,
     Contracted,
     Graph,
     _on_paths,
+    _Target,
+    _target_sums,
     contracted,
     distances,
     lexicographic,
@@ -49,7 +52,6 @@ from seqopt.graph.graph import (
     strictly_below,
     tied,
 )
-from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
@@ -294,8 +296,11 @@ class _Totals(Sums):
         return self._aim.each(values)[:, None]
 
 
-def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> Solution:
-    """Return the chosen path of an instance; its states are the numbers of nodes."""
+def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
+    """Return the chosen path of an instance; its states are the numbers of nodes.
+
+    ``instance``: has ``asked``, the graph of its goals and caps, and ``goals``.
+    """
     graph, goal = instance.asked, instance.goals[0]
     if goal.kind == TAIL:
         found = _least_tail(graph, goal, choose, watch)
@@ -356,7 +361,7 @@ class OnGraph(Terse):
 
     def __call__(
         self,
-        problem: States | Instance,
+        problem: Any,
         *,
         watch: Watch | None = None,
         seconds: float = np.inf,
@@ -374,7 +379,7 @@ class OnGraph(Terse):
         def choose(graph: Graph, watch: Watch) -> Choice:
             return self.choose(graph, watch, **options)
 
-        if isinstance(problem, Instance):
+        if not isinstance(problem, States):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)

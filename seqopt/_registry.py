@@ -73,6 +73,7 @@ OFFERS = {
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
+    "find_path": "seqopt.instances._solve",
     "find_postures": "seqopt.arms.reach",
     "read_measured": "seqopt.exchange.imports",
     "hold_alike": "seqopt.arms._permits",

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.harness.layers import Budget, LayeredCosts, Layers, compile_costs
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
-from seqopt.plan._answers import find_path
+from seqopt.instances._solve import find_path
 from seqopt.problem.problem import Aim
 
 

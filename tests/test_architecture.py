@@ -22,8 +22,8 @@ pytestmark = pytest.mark.xdist_group("architecture")  # one worker reads every f
 
 ROOMS = (
     {"arrays", "errors"},
-    {"_archives", "_files", "_registry", "work"},
-    {"_showing"},
+    {"_registry"},
+    {"_archives", "_files", "work"},
     {"scene"},
     {"network"},
     {"sequence", "contact"},
@@ -36,7 +36,8 @@ ROOMS = (
     {"study"},
     {"arms", "workflow"},
     {"sweep", "questions"},
-    {"exchange", "times", "instances"},
+    {"exchange", "times"},
+    {"instances"},
     {"report"},
     {"_cli"},
     {"__init__", "__main__"},

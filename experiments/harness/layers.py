@@ -15,10 +15,10 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import Graph, Rows, lexicographic
-from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
+from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, Rows, _Target, lexicographic
 from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
+from seqopt.instances.instance import Instance, _Cap
 from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim
 from seqopt.sequence.schedule import Schedule

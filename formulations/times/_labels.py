@@ -20,8 +20,8 @@ from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
 from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph, distances, fewest_moves, moves_along
-from seqopt.graph.instance import HELD, NOW, TimedGraph
 from seqopt.problem.requirements import Resource, StepArrays
+from seqopt.times._graph import HELD, NOW, TimedGraph
 
 ROUNDS = 25  # of cutting planes
 CLOSED = 1e-7  # relative tolerance of the multipliers

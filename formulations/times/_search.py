@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ from formulations.times._stages import ALMOST, Goals, Least, StageFound, Stages,
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._spaces import build_space, seen_steps
 from seqopt.graph.formulation import Solution, Watch
-from seqopt.graph.graph import tied
-from seqopt.graph.instance import PEAK, TIME, Instance
+from seqopt.graph.graph import PEAK, TIME, tied
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
@@ -94,7 +93,7 @@ class Waits:
         return Soonest(grips, times[-1].end, starts)
 
 
-def of_instance(instance: Instance, least: Least, watch: Watch) -> Solution:
+def of_instance(instance: Any, least: Least, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed if instance.asks_time else None
     if timed is None and not instance.resources:
@@ -133,7 +132,7 @@ def _no_higher(bounds: Sequence[float], values: tuple[float, ...]) -> tuple[floa
 
 
 def plan_in_time(
-    problem: States | Instance,
+    problem: Any,
     *,
     seconds: float = np.inf,
     max_memory: float = np.inf,
@@ -142,7 +141,7 @@ def plan_in_time(
 ) -> Solution:
     """Return the plan of least makespan, or the incumbent at the limit of time or memory."""
     watch = Watch(seconds, memory=max_memory)
-    if isinstance(problem, Instance):
+    if not isinstance(problem, States):
         return of_instance(problem, least, watch)
     if least is not by_labels and problem.standing is not None and problem.standing.curing:
         raise ProblemError("it does not know mortar that cures; take makespan_labels")

@@ -24,6 +24,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 
 Rows = NDArray[np.int32]
+SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
 TIED = 1e-9  # of the least: by how much a path may exceed it and still be one of the best
 OPEN = 2.0  # moves that a path may be longer for a state less to be asked
 MOST = 64  # states of a part that are asked at once
@@ -144,6 +145,25 @@ class Graph(FrozenValue):
         np.cumsum(np.bincount(source, minlength=self.states), out=starts[1:])
         shape = (self.states, self.states)
         return sparse.csr_array((costs, target, starts), shape=shape)
+
+
+class _Target(NamedTuple):
+    """What is minimized along a path.
+
+    ``kind``: ``sum`` or ``peak`` of one column, ``tail``: the mean of the largest sums of several
+    columns, no one of which weighs more than ``most``, or ``time``: when the last act ends.
+    """
+
+    name: str
+    kind: str
+    columns: tuple[int, ...] = ()
+    most: float = 1.0
+
+
+def _target_sums(goal: _Target, totals: Floats) -> float:
+    """Return the tail mean of totals (S,): the mean of the largest, by their weights."""
+    weights = np.clip(1.0 - goal.most * np.arange(len(totals)), 0.0, goal.most)
+    return float(np.sort(totals)[::-1] @ weights / weights.sum())
 
 
 class Best(NamedTuple):

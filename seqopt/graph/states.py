@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
     from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
+_Valued = Callable[[Ints], tuple[Floats, Bools]]
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
@@ -315,8 +316,7 @@ class States(Shown):
         key = id(self.engine), names, screen
         if key not in self.answers:
             self.answers[key] = GripSets(self.engine, names, self.resources, screen=screen)
-        found: GripSets = self.answers[key]
-        return found
+        return self.answers[key]  # type: ignore[no-any-return]
 
     @property
     def models(self) -> int:
@@ -485,7 +485,7 @@ class States(Shown):
         """
         if self.each:
             asked = [partial(p.standing_values, level) for p in self.each]
-            return self._worst(asked, level, states, most)
+            return self._worst(asked, level, states, most, rough=False)
         out, within = self.values(level, states)
         if self.demands:
             rows = np.flatnonzero(within)
@@ -514,13 +514,7 @@ class States(Shown):
         return self.stability.recalled(bricks, *self.held_to_stand(states))
 
     def _worst(
-        self,
-        valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]],
-        level: int,
-        states: Ints,
-        most: float,
-        *,
-        rough: bool = False,
+        self, asked: Sequence[_Valued], level: int, states: Ints, most: float, *, rough: bool
     ) -> tuple[Floats, Bools]:
         """Return values (n, g) over scenarios, evaluated where none before excludes the state.
 
@@ -528,12 +522,12 @@ class States(Shown):
         """
         out = np.zeros((len(states), len(self.goals)))
         within, ahead = np.ones(len(states), dtype=bool), 0
-        for number, values in enumerate(valued):
+        for number, values in enumerate(asked):
             rows = np.flatnonzero(within & (out[:, 0] <= most))
             if not len(rows):
                 break
             if number == ahead:
-                ahead = min(3 * number + 1, len(valued))
+                ahead = min(3 * number + 1, len(asked))
                 self._fill(range(number, ahead), level, states[rows], rough=rough)
             found, ok = values(states[rows])
             out[rows], within[rows] = self.joined(out[rows], found, number), ok
@@ -542,14 +536,11 @@ class States(Shown):
 
     def _fill(self, parts: Sequence[int], level: int, states: Ints, *, rough: bool) -> None:
         """Compute the responses of states in some scenarios, by number, together."""
-        bricks = self.space.bricks_at(level)
-        if len(parts) > 1 and bricks and not self.each[0]._by_candidates:
+        bricks, key = self.space.bricks_at(level), ("together", *map(id, self.scenarios))
+        if bricks and not self.each[0]._by_candidates:
             sets = [one.screened if rough else one.sets for one in self.each]
-            key = "together", *map(id, self.scenarios)
-            if key not in self.answers:
-                self.answers[key] = ScenarioSets(self.scenarios, self.resources)
-            held, _ = _ascending(self.each[0]._columns(states), self._caps)
-            self.answers[key].fill(parts, sets, bricks, held)
+            together = self.answers.setdefault(key, ScenarioSets(self.scenarios, self.resources))
+            together.fill(parts, sets, bricks, np.sort(self.each[0]._columns(states), axis=1))
 
     def joined(self, before: Floats, values: Floats, number: int) -> Floats:
         """Return values (n, g) over scenarios with those of one more, the scenario of a number."""

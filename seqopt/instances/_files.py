@@ -16,20 +16,11 @@ from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt._registry import Later
 from seqopt.errors import FileError, ProblemError
-from seqopt.graph.graph import Graph
-from seqopt.graph.instance import (
-    NOW,
-    PEAK,
-    SUM,
-    TAIL,
-    Instance,
-    TimedGraph,
-    _by_goal,
-    _Cap,
-    _Target,
-)
+from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, _Target
 from seqopt.instances._program import as_mps
+from seqopt.instances.instance import Instance, _by_goal, _Cap
 from seqopt.scene._checks import short
+from seqopt.times._graph import NOW, TimedGraph
 
 jsonschema = Later("jsonschema")  # slow to import, and of files alone
 

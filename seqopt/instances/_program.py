@@ -18,7 +18,8 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.instance import PEAK, SUM, TAIL, Instance
+from seqopt.graph.graph import PEAK, SUM, TAIL
+from seqopt.instances.instance import Instance
 
 
 class Program(NamedTuple):

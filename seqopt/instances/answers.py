@@ -12,9 +12,9 @@ import numpy as np
 
 from seqopt._files import parse_json, read_text
 from seqopt.errors import ProblemError
-from seqopt.graph.instance import Instance
 from seqopt.instances._files import read_instance
-from seqopt.judge._paths import Answer, Claim, judge_path
+from seqopt.instances._judge import Answer, Claim, judge_path
+from seqopt.instances.instance import Instance
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import short
 

@@ -17,20 +17,10 @@ from seqopt.engines.registry import DEFAULT
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._spaces import build_space
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.graph import Graph, _on_paths, contracted
-from seqopt.graph.instance import (
-    PEAK,
-    SUM,
-    TAIL,
-    TIME,
-    Instance,
-    TimedGraph,
-    _by_goal,
-    _Cap,
-    _Target,
-)
+from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, Graph, _on_paths, _Target, contracted
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
+from seqopt.instances.instance import Instance, _by_goal, _Cap
 from seqopt.plan.solve import graph_of, without_shares
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim, Problem
@@ -40,6 +30,7 @@ from seqopt.sequence.part import Part
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
+from seqopt.times._graph import TimedGraph
 from seqopt.work.progress import Clock, Tell
 from seqopt.workflow import Robust, Search, pose_build
 

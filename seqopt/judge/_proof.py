@@ -21,15 +21,18 @@ from seqopt.graph.formulation import LabelProof, Solution
 from seqopt.graph.graph import (
     FAILS,
     PASSES,
+    PEAK,
+    SUM,
+    TIME,
     Graph,
     _lazy_path,
+    _Target,
     cut,
     lexicographic,
     lexicographic_bounds,
     potentials,
     reached,
 )
-from seqopt.graph.instance import PEAK, SUM, TIME, _Target
 from seqopt.graph.states import States
 from seqopt.judge._rule_moves import RuleTables, Transitions
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, places

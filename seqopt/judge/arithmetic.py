@@ -31,9 +31,13 @@ from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
 from seqopt.graph._labels import CappedSums, Joint, Sweep, Swept
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import (
+    PEAK,
     ROUNDING,
+    SUM,
     TIED,
+    TIME,
     Graph,
+    _Target,
     _to_go,
     cut,
     least_sum,
@@ -41,7 +45,6 @@ from seqopt.graph.graph import (
     strictly_below,
     tied,
 )
-from seqopt.graph.instance import PEAK, SUM, TIME, _Target
 from seqopt.problem.requirements import Resource, StepArrays
 
 BETTER = 1e-9  # over a value: a path must be better by more than this

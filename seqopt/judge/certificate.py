@@ -19,7 +19,6 @@ import numpy as np
 from seqopt._registry import registered
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.instance import TimedGraph
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays
 from seqopt.problem.requirements import Limit
 from seqopt.responses._grip_sets import Moved
@@ -126,12 +125,12 @@ class PathTwin(NamedTuple):
     ``value``: of the steps of a problem, with the starts that are claimed; ``clocks``: makes of an
     evaluator, rebuilt states and claimed motions these in time, as of
     `seqopt.times._clock.TimedRows`; ``path_value``: of arcs and acts of an instance; ``claimed``:
-    what a claim about an instance proves, as of `seqopt.judge._paths.proven`.
+    what a claim about an instance proves, as of `seqopt.instances._judge.proven`.
     """
 
     value: Callable[[Any, Sequence[Any], Sequence[float]], float]
     clocks: Callable[..., Any]
-    path_value: Callable[[TimedGraph, Any, Any], float]
+    path_value: Callable[[Any, Any, Any], float]
     claimed: Callable[..., float]
 
 

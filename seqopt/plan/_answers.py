@@ -9,8 +9,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
-from copy import deepcopy
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
@@ -21,36 +20,18 @@ import numpy as np
 
 from seqopt._registry import Later
 from seqopt.arrays import Ints
-from seqopt.errors import (
-    InfeasibleError,
-    NothingFoundError,
-    ProblemError,
-    SeqoptError,
-    SolverError,
-    TimeUpError,
-    message_of,
-)
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
 from seqopt.graph._candidates import walk
 from seqopt.graph._spaces import barred, steps_in_hands
-from seqopt.graph.formulation import (
-    Formulation,
-    FormulationKind,
-    LabelProof,
-    Run,
-    Solution,
-    Watch,
-    timed,
-)
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
+from seqopt.graph.formulation import Formulation, FormulationKind, LabelProof, Run, Solution, Watch
 from seqopt.graph.states import States
 from seqopt.judge._schedules import judge_schedule, ordered
-from seqopt.judge.certificate import TOLERANCE, Certificate
+from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
 from seqopt.work._workers import keep
-from seqopt.work.progress import INTERRUPT, answered
 
-INFEASIBLE, PATHS = Later("seqopt.plan._infeasible"), Later("seqopt.judge._paths")  # seldom needed
+INFEASIBLE = Later("seqopt.plan._infeasible")  # seldom needed
 COUNTED = ("each", "stability")  # of a problem: they know what was computed
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 Result = TypeVar("Result")
@@ -155,32 +136,13 @@ def _wholes(given: object) -> Ints:
     return out.astype(np.int64)
 
 
-def find(graph: States | Instance, formulation: Formulation, run: Run) -> Found:
-    """Find a path through a graph by a formulation, certified if a proof is requested.
+def find(problem: States, formulation: Formulation, run: Run) -> Found:
+    """Find states of a build by a formulation, certified if a proof is requested.
 
     Raises `InfeasibleError`, which says why, if no choice is feasible; `ProblemError` if graph,
     formulation and options are incompatible; `SolverError` if the answer fails its check.
     """
-    if not isinstance(run.time_limit, Real) or not run.time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(run.time_limit)}; give seconds from 0")
-    if isfinite(run.time_limit) and not (formulation.watched or "seconds" in formulation.options):
-        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
-    formulation.require_options(run.options)
-    return (find_path if isinstance(graph, Instance) else _find_states)(graph, formulation, run)
-
-
-def _proven(
-    selection: Solution, judge: Callable[[], Certificate], run: Run
-) -> tuple[Solution, Certificate | None]:
-    """Return a solution with its certificate, if one is requested and there is time for it."""
-    if not run.proof:
-        return selection, None
-    certificate, stopped = run.clock.tried(judge)
-    return replace(selection, stopped=stopped or selection.stopped), certificate
-
-
-def _find_states(problem: States, formulation: Formulation, run: Run) -> Found:
-    """Find states of a build, as `find`."""
+    check_run(formulation, run)
     start = time.perf_counter()
     told: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
     watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
@@ -207,6 +169,25 @@ def _find_states(problem: States, formulation: Formulation, run: Run) -> Found:
     seconds = {"compile": written, "solve": solved - start - written}
     seconds["verify"] = time.perf_counter() - solved
     return Found(selection, certificate, steps, seconds)
+
+
+def check_run(formulation: Formulation, run: Run) -> None:
+    """Raise a `ProblemError` if a formulation does not take the limits and options of a run."""
+    if not isinstance(run.time_limit, Real) or not run.time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(run.time_limit)}; give seconds from 0")
+    if isfinite(run.time_limit) and not (formulation.watched or "seconds" in formulation.options):
+        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+    formulation.require_options(run.options)
+
+
+def _proven(
+    selection: Solution, judge: Callable[[], Certificate], run: Run
+) -> tuple[Solution, Certificate | None]:
+    """Return a solution with its certificate, if one is requested and there is time for it."""
+    if not run.proof:
+        return selection, None
+    certificate, stopped = run.clock.tried(judge)
+    return replace(selection, stopped=stopped or selection.stopped), certificate
 
 
 def _for_search(problem: States) -> States:
@@ -254,109 +235,3 @@ def _choose_states(
         raise why from None
     vars(problem).update({key: vars(own)[key] for key in COUNTED if key in vars(own)})
     return with_numbers(name, selection, len(problem.goals))
-
-
-def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
-    """Find a path through an instance, as `find`.
-
-    On an interrupt the formulation returns its incumbent; `KeyboardInterrupt` if there is none yet.
-    """
-    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
-    seconds = {"compile": 0.0}
-    with timed(seconds, "solve"):
-        selection = _choose_path(instance, formulation, run, watch)
-    seconds["compile"] = selection.compile_seconds
-    seconds["solve"] -= selection.compile_seconds
-    with timed(seconds, "verify"):
-        judge = partial(judged, instance, formulation, selection)
-        selection, certificate = _proven(selection, judge, run)
-    return Found(selection, certificate, (), seconds)
-
-
-def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
-    """Return the formulation's solution, converted to numbers; raise why there is none."""
-    name = formulation.name
-    limit = {} if run.left == inf else {"seconds": run.left}
-    told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
-    own = deepcopy(replace(instance, resources=()))  # resources are code: they have no data
-    solve = partial(
-        formulation.solve, replace(own, resources=instance.resources), **run.options, **told
-    )
-    try:
-        with answered(watch.interrupt) if formulation.watched else nullcontext():
-            found = called(name, Solution, solve)
-    except InfeasibleError as error:
-        if instance.resources:
-            raise InfeasibleError(f"claimed by {name}, and not proven: {error}") from None
-        if not instance.caps:
-            raise SolverError(
-                f"formulation {name} says that no path is allowed, and some are: {error}"
-            ) from None
-        raise INFEASIBLE.refusal(instance, name, exact=formulation.looks_at_all) from None
-    except (NothingFoundError, TimeUpError) as error:
-        low = watch.bound
-        said = f"{error} (no path is below {low:.6g})" if isfinite(low) else str(error)
-        raise (KeyboardInterrupt if watch.interrupted else type(error))(said) from error
-    except SolverError as error:
-        if watch.interrupted:
-            raise KeyboardInterrupt(str(error)) from error
-        raise
-    selection = with_numbers(name, found, len(instance.goals))
-    if any(len(state) != 1 for state in selection.states):
-        raise SolverError(f"formulation {name} returned nonsense: a state is no node of the graph")
-    stopped = INTERRUPT if watch.interrupted else selection.stopped
-    watch.tell(selection.objective[0], selection.bound[0])  # without a clock there is no log
-    return replace(selection, stopped=stopped, trace=watch.trace)
-
-
-def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
-    """Return the certificate of a path from the multipliers and labels of its formulation."""
-    nodes = np.array([state[0] for state in found.states])
-    answer = PATHS.Answer("nodes", nodes, found.objective, tuple(_claims(instance, found)))
-    try:
-        proof: Certificate = PATHS.judge_path(instance, answer)
-    except PATHS.OverCapError as error:
-        raise SolverError(f"{error}; use a formulation that keeps budgets exactly") from None
-    exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
-    if exact and instance.is_plain and proof.gap > TOLERANCE:
-        raise SolverError(
-            f"{formulation.name} promises the least, and no more than "
-            f"{', '.join(f'{b:.9g}' for b in proof.bounds)} is proven"
-        )
-    said, value = found.bound[0], proof.values[0]
-    if instance.is_plain and said > proof.bounds[0] + TOLERANCE * abs(value):
-        raise SolverError(f"the claimed bound {said:.9g} exceeds {proof.bounds[0]:.9g}")
-    pairs = zip(proof.values, proof.bounds, found.bound, strict=True)
-    left = [(v - min(v, max(b, said))) / (abs(v) or 1.0) for v, b, said in pairs]
-    return replace(proof, claimed_gap=max(left))
-
-
-def _claims(instance: Instance, found: Solution) -> list[Any]:
-    """Return the claimed bound of each goal with its multipliers, as far as they are given.
-
-    Of makespans these are labels, if any, and shares of robot kinds.
-    """
-    claim, kinds = PATHS.Claim, [goal.kind for goal in instance.goals]
-    if instance.asks_time and instance.timed is not None:
-        _, firsts = np.unique(instance.timed.kinds, return_index=True)
-        first, own = 0 if instance.caps else kinds.index(TIME), [claim() for _ in kinds]
-        for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
-            if kinds[k] == TIME and len(proof.prices):
-                labels = (proof.states[:, 1], proof.labels) if len(proof.labels) else None
-                value = None if labels is None else found.bound[k]
-                own[k] = claim(value, shares=proof.prices[:, [0, *(1 + firsts)]], labels=labels)
-        return own
-    if instance.resources:
-        pairs = zip(found.proofs, found.bound, strict=False)
-        if not all(each.twin for each in instance.resources):
-            return [claim(bound) for bound in found.bound]
-        return [claim(b, labels=(proof.states[:, 1], proof.labels)) for proof, b in pairs]
-    if kinds == [TAIL]:
-        return [claim(weights=np.array(found.prices[0]))] if found.prices else []
-    sums, out = [cap.name for cap in instance.caps], list[Any]()
-    for goal, prices, bound in zip(instance.goals, found.prices, found.bound, strict=False):
-        named = {n: max(p, 0.0) for n, p in zip(sums, prices, strict=False)}
-        out.append(claim(bound if goal.kind == PEAK else None, prices=named))
-        if goal.kind == SUM:
-            sums.append(goal.name)
-    return out if instance.caps else []

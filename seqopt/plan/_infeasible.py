@@ -11,7 +11,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, islice
+from itertools import islice
 
 import numpy as np
 
@@ -28,12 +28,10 @@ from seqopt.graph._spaces import (
     explore,
     with_margin,
 )
-from seqopt.graph.graph import distances, least_peak, least_sum, tied
-from seqopt.graph.instance import Instance, _Cap
+from seqopt.graph.graph import distances, least_peak, tied
 from seqopt.graph.space import Explorer
 from seqopt.graph.states import States
 from seqopt.judge._proof import Proof, TooManyPartsError
-from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
@@ -47,50 +45,11 @@ from seqopt.stability.standing import Standing
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
 
-def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
-    """Return the smallest set of caps proven infeasible together; empty if none is found."""
-    counts, nothing = range(1, len(instance.caps) + 1), np.zeros(instance.arcs)
-    for some in chain.from_iterable(combinations(instance.caps, count) for count in counts):
-        own = instance.graph, nothing, _limited(some), 1.0
-        if least_within(*own, labels=instance.is_layered) >= PROVEN:
-            return some
-    return ()
-
-
-def _limited(caps: Sequence[_Cap]) -> list[tuple[int, float]]:
-    return [(cap.column, cap.most) for cap in caps if cap.column is not None]
-
-
 def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFoundError:
     """Return an unproven infeasibility error; ``exact``: the formulation searches all plans."""
     if exact:
         return InfeasibleError(f"claimed by {name}, and not proven: {why}")
     return NothingFoundError(f"{name} found none, and there may be one: {why}")
-
-
-def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that names the caps in conflict; a `SolverError` if a path is feasible."""
-    found = smallest_conflict(instance)
-    limited, labels = _limited(instance.caps), instance.is_layered
-    if not found and _is_kept(instance.graph, limited, labels=labels):
-        return SolverError(
-            f"formulation {name} says that no choice is within all budgets, and some are"
-        )
-    if not found:
-        return claimed(name, "no choice is within all budgets; raise a bound", exact=exact)
-    if len(found) == 1:
-        (cap,) = found
-        least = least_sum(instance.graph, instance.amounts[:, cap.column or 0])
-        return InfeasibleError(
-            f"no choice is within all budgets: every choice uses at least {least:.6g} of "
-            f"{cap.name!r}, more than {cap.most:.6g}; raise that bound"
-        )
-    named = [f"{cap.most:.6g} of {cap.name!r}" for cap in found]
-    fewer = "each can alone" if len(found) == 2 else "any fewer of them can"
-    return InfeasibleError(
-        f"no choice is within all budgets: {', '.join(named[:-1])} and {named[-1]} cannot be kept "
-        f"together, though {fewer}; raise one of them"
-    )
 
 
 ALLOWED = "says that no plan is allowed, and some are"

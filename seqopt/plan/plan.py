@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pandas as pd
 
@@ -16,8 +17,7 @@ from seqopt._registry import Later, display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, OpeningEngine, Want
 from seqopt.engines.registry import DEFAULT, provenance
-from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Solution
-from seqopt.graph.instance import Instance
+from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Run, Solution
 from seqopt.graph.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan.build import ShownBuild
@@ -62,6 +62,50 @@ class Status(StrEnum):
     UNPROVEN = "unproven"  # no proof was asked for, or it was left out
 
 
+class Given(ABC):
+    """A problem that no scene has, such as an instance: it is solved, and shown, as it says."""
+
+    title, among, scenarios, models = "", "", (), 0
+    standing: Any = None
+    begin: Any = None
+
+    @abstractmethod
+    def solved(self, named: Formulation | str | None, run: Run) -> Plan:
+        """Return the plan that a formulation finds, by name or the usual one."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The names of the goals."""
+
+    @property
+    @abstractmethod
+    def alone_in_scene(self) -> NoReturn:
+        """Raise a `ProblemError`: there is no scene."""
+
+    @abstractmethod
+    def chosen_nodes(
+        self, steps: Sequence[Step], states: Sequence[Sequence[int]]
+    ) -> tuple[int, ...]:
+        """Return the nodes of a path."""
+
+    @abstractmethod
+    def facts_of(self) -> dict[str, object]:
+        """Return its properties for a summary, ready for JSON."""
+
+    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the first goals by their names."""
+        return dict(zip(self.names, values, strict=False))
+
+    def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
+        """Return the bounds of goals."""
+        return bounds
+
+    def settles(self, *, exact: bool) -> bool:
+        """Return whether a judged plan is optimal though it has a gap: never."""
+        return False
+
+
 @dataclass(frozen=True, repr=False)
 class Plan(ShownBuild):
     """A solved problem: every grip of a build, with objective values and bounds.
@@ -70,7 +114,7 @@ class Plan(ShownBuild):
     ----------
     problem : Problem
         The problem; or the graph of choices, if that was given.
-    graph : States or Instance
+    graph : States or Given
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
@@ -102,8 +146,8 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | States | Instance
-    graph: States | Instance
+    problem: Problem | States | Given
+    graph: States | Given
     formulation: Formulation
     selection: Solution
     certificate: Certificate | None
@@ -352,7 +396,7 @@ class Plan(ShownBuild):
         """
         named = {"formulation": self.formulation.name, "kind": self.formulation.kind.value}
         if not self.steps:  # a path through an instance, or given costs
-            known: dict[str, object] = getattr(self.problem, "facts_of", dict)()
+            known = self.graph.facts_of() if isinstance(self.graph, Given) else {}
             spent = dict(getattr(self.certificate, "spent", {}))
             whole = {**named, **known, **self._answer(), "budgets": spent}
             return whole | {"nodes_of_path": [*self.nodes], "seconds": dict(self.seconds)}

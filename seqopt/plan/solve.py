@@ -19,9 +19,8 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, message_of
 from seqopt.graph.formulation import End, Formulation, Run, as_formulation
-from seqopt.graph.instance import Instance
 from seqopt.graph.states import States, build_states, over_scenarios, within
-from seqopt.plan.plan import Plan
+from seqopt.plan.plan import Given, Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
@@ -175,7 +174,7 @@ def default_formulation(problem: Problem) -> str:
 
 
 def solve(
-    problem: Problem | States | Instance,
+    problem: Problem | States | Given,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -227,7 +226,9 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     A proof without time is left out: values and bounds are claimed only. Raises `TimeUpError` if
     there is no plan in time.
     """
-    if isinstance(problem, States | Instance):
+    if isinstance(problem, Given):
+        return problem.solved(formulation, run)
+    if isinstance(problem, States):
         return _chosen(problem, problem.formulation(formulation), run)
     if not isinstance(problem, Problem):
         kind = type(problem).__name__
@@ -261,7 +262,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     return replace(best_within(problem, best, lambda p: p.moved, interrupted), problem=given)
 
 
-def _chosen(graph: States | Instance, formulation: Formulation, run: Run) -> Plan:
+def _chosen(graph: States, formulation: Formulation, run: Run) -> Plan:
     """Let a formulation choose from a graph; the judged answer is a plan."""
     found = ANSWERS.find(graph, formulation, run)
     return Plan(graph, graph.at(found.selection.order), formulation, *found)

@@ -277,7 +277,8 @@ def _row(plan: Plan) -> dict[str, object]:
         value, gap = plan.certificate.objective, plan.certificate.gap
         models = plan.models
         if plan.formulation.windowed == ():  # alone it needs fewer
-            models = solve(replace(plan.problem), plan.formulation, proof=False).models
+            again: Problem = plan.problem  # type: ignore[assignment]  # of a comparison
+            models = solve(replace(again), plan.formulation, proof=False).models
         seconds = sum(plan.seconds[stage] for stage in ("compile", "solve", "verify"))
     about = {"problem": plan.method, "objective": value, "gap": gap, "models": models}
     return about | {"seconds": seconds, "solve_seconds": plan.seconds["solve"]}

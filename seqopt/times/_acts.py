@@ -8,8 +8,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import Graph
-from seqopt.graph.instance import HELD, NOW, TimedGraph
 from seqopt.times._fall_cuts import CuringStates
+from seqopt.times._graph import HELD, NOW, TimedGraph
 
 Groups = tuple[tuple[int, ...], ...]
 

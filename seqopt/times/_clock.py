@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
-from seqopt.graph.graph import Graph, _to_go
-from seqopt.graph.instance import TIME, Instance, TimedGraph, _Target
-from seqopt.judge._paths import Claim
+from seqopt.graph.graph import TIME, Graph, _Target, _to_go
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
 from seqopt.judge.arithmetic import Book, Closed, Stage, _is_beyond_limits, _sum_bound, limit_below
@@ -21,6 +20,7 @@ from seqopt.stability.standing import Standing
 from seqopt.times._acts import Acts, Team, acts_of_instance, acts_of_rows, alike_in_order
 from seqopt.times._curing import JointsInTime
 from seqopt.times._fall_cuts import CuringStates, FallCuts
+from seqopt.times._graph import TimedGraph
 from seqopt.times._steps import require_durations
 
 
@@ -180,7 +180,7 @@ class Floors:
         return out
 
 
-def claimed_time(instance: Instance, stage: Stage, claim: Claim, prices: Sequence[float]) -> float:
+def claimed_time(instance: Any, stage: Stage, claim: Any, prices: Sequence[float]) -> float:
     """Return when the last act ends at the earliest, by shares of the time of robots.
 
     ``prices``: multipliers of the caps of a stage.
@@ -207,7 +207,8 @@ def claimed_time(instance: Instance, stage: Stage, claim: Claim, prices: Sequenc
         since = alike_in_order(acts.groups, acts.entries[nodes], own)
         values = np.column_stack([values[:, 0], since, values[:, 1 + acts.count :]])
         if closed.is_proof((nodes, values)):
-            return claim.value
+            least: float = claim.value
+            return least
         raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
     bounds = [_sum_bound(stage, timed.work[kept] @ own, prices) for own in shares]
     return max(bounds) * (1 - 1e-12)

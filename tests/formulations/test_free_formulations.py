@@ -16,10 +16,10 @@ from formulations._search import ThresholdSearch
 from formulations.on_graph import Choice, on_graph
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
-from seqopt.graph.graph import _on_paths, fewest_moves, path_values
-from seqopt.graph.instance import Instance, _Cap, _Target
+from seqopt.graph.graph import _on_paths, _Target, fewest_moves, path_values
 from seqopt.graph.space import Explorer, Moves, Space
 from seqopt.graph.states import build_states
+from seqopt.instances.instance import Instance, _Cap
 from seqopt.problem.problem import Aim
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability.assessment import Verdict

@@ -28,11 +28,11 @@ from seqopt.graph.graph import (
     reached,
 )
 from seqopt.graph.states import build_states
+from seqopt.instances._solve import smallest_conflict
 from seqopt.judge import arithmetic as budget_proof
 from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.judge._states import Filter, StateEvaluator
 from seqopt.judge.arithmetic import budget_bounds, least_within
-from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit

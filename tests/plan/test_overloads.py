@@ -69,7 +69,7 @@ def small():
 
 
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
-    monkeypatch.setattr("seqopt.judge._paths.proven", lambda *_: 99.0)
+    monkeypatch.setattr("seqopt.instances._judge.proven", lambda *_: 99.0)
     with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):
         seqopt.solve(small(), "overlap_dp")
 

@@ -19,7 +19,7 @@ from formulations.scenario_program import solve_program
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation
-from seqopt.plan._answers import find_path
+from seqopt.instances._solve import find_path
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses import Resources
 from seqopt.scene.scenarios import scenarios

@@ -15,10 +15,10 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError
-from seqopt.graph.instance import Instance
 from seqopt.instances._files import WRITERS, save_instance
+from seqopt.instances._judge import first_stage
 from seqopt.instances.compiled import instance
-from seqopt.judge._paths import first_stage
+from seqopt.instances.instance import Instance
 from seqopt.work.progress import Tell
 
 OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")

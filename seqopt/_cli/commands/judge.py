@@ -9,9 +9,9 @@ from typing import Annotated
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.signatures import Call
 from seqopt.errors import SolverError
-from seqopt.graph.instance import Instance
 from seqopt.instances._files import read_instance
 from seqopt.instances.answers import judge_instance
+from seqopt.instances.instance import Instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 

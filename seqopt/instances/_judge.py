@@ -10,8 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.graph import tied
-from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
+from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, _Target, _target_sums, tied
+from seqopt.instances.instance import Instance
 from seqopt.judge.arithmetic import (
     ABOVE,
     Closed,

@@ -9,65 +9,16 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from seqopt._registry import Shown
+from seqopt._registry import Shown, offered
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, as_formulation, formulations
-from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.formulation import Formulation, Run, as_formulation, formulations
+from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, Graph, Rows, _Target
+from seqopt.plan.plan import Given, Plan
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Resource, StepArrays
-from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Step
-
-SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
-HELD, NOW = -1, -2  # where the readiness of a column comes from: it has none, the end of the act
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class TimedGraph(FrozenValue):
-    """States, moves and acts of a build in time.
-
-    Of states: ``levels`` (n,), of which no move leads to a lower one; ``free`` (n, c), of which
-    columns the robots are; ``alike`` (n, c - 1), which columns could change places with the next
-    one. ``kinds`` (c,): of the robot of every column; ``longest`` (c,): how long they take at most
-    to be prepared, s. Of acts (a,): ``move``; ``column`` of the state before whose robot takes a
-    grip, -1 where robots let go; ``origin`` (a, c): from which column of the state before the one
-    after has its readiness, or `HELD`, `NOW`. Of moves: ``prepares``, ``acts`` (m,), s; ``work``
-    (m, 1 + k): how long they take of the time of all, and of the robots of every kind, s:
-    preparing, acting, and holding while others act. ``curing``: what mortar that cures asks for.
-    """
-
-    graph: Graph
-    levels: Ints
-    free: Bools
-    alike: Bools
-    kinds: Ints
-    move: Ints
-    column: Ints
-    origin: Ints
-    prepares: Floats
-    acts: Floats
-    work: Floats
-    longest: Floats
-    curing: Any = None  # of the room of times, which alone reads it
-
-    @property
-    def sizes(self) -> Ints:
-        """How many there are to share the work: all as one, then robots of every kind, (1 + k,)."""
-        return np.array([1, *np.bincount(self.kinds)])
-
-
-class _Target(NamedTuple):
-    """What is minimized along a path.
-
-    ``kind``: ``sum`` or ``peak`` of one column, ``tail``: the mean of the largest sums of several
-    columns, no one of which weighs more than ``most``, or ``time``: when the last act ends.
-    """
-
-    name: str
-    kind: str
-    columns: tuple[int, ...] = ()
-    most: float = 1.0
+from seqopt.times._graph import TimedGraph
 
 
 class _Cap(NamedTuple):
@@ -79,7 +30,7 @@ class _Cap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Instance(FrozenValue, Shown):
+class Instance(FrozenValue, Given, Shown):
     """A graph with amounts of its arcs, goals and caps of paths through it; no scene is needed.
 
     A path leads from node 0 to one of the ends. Goals are minimized one after the other: of the
@@ -152,17 +103,15 @@ class Instance(FrozenValue, Shown):
         capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
         return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
 
-    title, among, scenarios = "", "", ()  # of no scene
-    models, standing, begin = 0, None, None
-
     @property
     def alone_in_scene(self) -> NoReturn:
         """Nothing: an instance has no scene; a `ProblemError` says so."""
         raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
 
-    def at(self, order: Order) -> Instance:
-        """Return itself: its order is given."""
-        return self
+    def solved(self, named: Formulation | str | None, run: Run) -> Plan:
+        """Return the path that a formulation finds, judged, as a plan."""
+        found = self.formulation(named)
+        return Plan(self, self, found, *offered("find_path")(self, found, run))
 
     @property
     def fitting(self) -> tuple[str, ...]:
@@ -194,23 +143,11 @@ class Instance(FrozenValue, Shown):
         """The names of the goals."""
         return tuple(goal.name for goal in self.goals)
 
-    def in_display_units(self, values: Sequence[float]) -> dict[str, float]:
-        """Return values of the first goals by their names."""
-        return dict(zip(self.names, values, strict=False))
-
-    def bounded(self, bounds: Sequence[Any]) -> Sequence[Any]:
-        """Return the bounds of goals."""
-        return bounds
-
     def chosen_nodes(
         self, steps: Sequence[Step], states: Sequence[Sequence[int]]
     ) -> tuple[int, ...]:
         """Return the nodes of a path."""
         return tuple(state[-1] for state in states)
-
-    def settles(self, *, exact: bool) -> bool:
-        """Return whether a judged plan is optimal though it has a gap: never."""
-        return False
 
     @property
     def nodes(self) -> int:
@@ -281,12 +218,6 @@ class Instance(FrozenValue, Shown):
             "caps": {cap.name: cap.most for cap in self.caps},
             "made_by": self.facts.get("made_by", ""),
         }
-
-
-def _target_sums(goal: _Target, totals: Floats) -> float:
-    """Return the tail mean of totals (S,): the mean of the largest, by their weights."""
-    weights = np.clip(1.0 - goal.most * np.arange(len(totals)), 0.0, goal.most)
-    return float(np.sort(totals)[::-1] @ weights / weights.sum())
 
 
 def _by_goal(graph: Graph, asked: tuple[tuple[_Target, ...], tuple[_Cap, ...]]) -> Graph:
