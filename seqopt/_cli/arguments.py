@@ -33,6 +33,7 @@ seqopt --help names all commands, seqopt COMMAND --help what each can do.
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
+SCHEDULE = re.compile(r"unrecognized arguments: (free|loop|[a-z]+-(?:robot|sequential))\b")
 LEADS = {"limit": "limits", "option": "options", "round": "rounding"}
 NAMES = "begin criterion curing direction durations engine grips holds lost measured missing"
 NAMES += " mortar payload props reference robots rules stands to vary"
@@ -47,11 +48,15 @@ def _nearest(message: str, options: Iterable[str]) -> str:
 
     >>> _nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
     ' (did you mean --formulation?)'
+    >>> _nearest("unrecognized arguments: free", ["--schedule"])
+    ' (did you mean --schedule free?)'
     >>> _nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
     ' (did you mean optimize?)'
     """
     if found := WRONG_CHOICE.search(message):
         return did_you_mean(found[1], [word.strip(" '") for word in found[2].split(",")])
+    if "--schedule" in options and (found := SCHEDULE.search(message)):
+        return f" (did you mean --schedule {found[1]}?)"
     found = UNKNOWN.search(message)
     if found is None:
         return ""
