@@ -45,6 +45,11 @@ Watching = Callable[[Explorer], None]
 Search = Callable[[States], Solution]
 
 
+def has_scene(problem: object) -> bool:
+    """Return whether a problem is of states of a scene; an instance is arrays alone."""
+    return isinstance(problem, States)
+
+
 def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
     """Return a callback of explorers: it reports progress, and enforces time and memory limits.
 

@@ -25,6 +25,7 @@ from formulations._search import (
     Watching,
     _too_little,
     after_margins,
+    has_scene,
     narrow,
     plan_by_then,
     selected,
@@ -379,7 +380,7 @@ class OnGraph(Terse):
         def choose(graph: Graph, watch: Watch) -> Choice:
             return self.choose(graph, watch, **options)
 
-        if not isinstance(problem, States):
+        if not has_scene(problem):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)

@@ -19,6 +19,7 @@ from formulations._search import (
     Watching,
     after_margins,
     close_fallen,
+    has_scene,
     narrow,
     plan_by_then,
     watched,
@@ -141,7 +142,7 @@ def plan_in_time(
 ) -> Solution:
     """Return the plan of least makespan, or the incumbent at the limit of time or memory."""
     watch = Watch(seconds, memory=max_memory)
-    if not isinstance(problem, States):
+    if not has_scene(problem):
         return of_instance(problem, least, watch)
     if least is not by_labels and problem.standing is not None and problem.standing.curing:
         raise ProblemError("it does not know mortar that cures; take makespan_labels")
