@@ -344,10 +344,13 @@ def strictly_below(problem, value):
 
 @pytest.mark.slow
 def test_a_large_search_looks_at_little_more_than_its_proof_needs():
-    """The models of states strictly below the least worst value, and a tenth for a first plan."""
-    scene = longer(seqopt.load_scene("arch25"), 4.0)
-    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps"
+    """The models of states strictly below the least worst value, and some for a first plan.
+
+    Of these 85 bricks a dive that gives up early misses the plan: then seven times as many.
+    """
+    scene = longer(seqopt.load_scene("arch25"), 3.5)
+    asked = FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax"
     plan = seqopt.solve(build_states(seqopt.make_engine("compliance", scene), *asked))
     fresh = build_states(seqopt.make_engine("compliance", scene), *asked)
     assert plan.certificate.gap == 0
-    assert plan.models <= 1.1 * strictly_below(fresh, plan.objective["minmax"])
+    assert plan.models <= 1.2 * strictly_below(fresh, plan.objective["minmax"])
