@@ -327,7 +327,8 @@ def strictly_below(problem, value):
     """How many models tell which states below a value are reached, in whole levels."""
     space, entering = problem.space, {problem.space.first: [problem.space.start()]}
     for level in range(space.first, space.levels + 1):
-        fresh, known = np.concatenate(entering.pop(level, [space.start()[:0]])), np.zeros(0, int)
+        entries = [space.start()[:0], *entering.pop(level, [])]
+        fresh, known = np.concatenate(entries), np.zeros(0, int)
         while len(fresh):
             codes, first = np.unique(space.codes(fresh), return_index=True)
             states, known = fresh[first[~np.isin(codes, known)]], np.union1d(known, codes)
