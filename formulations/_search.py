@@ -338,7 +338,7 @@ class ThresholdSearch:
 
     def _dives(self, threshold: float, below: float) -> bool:
         """Return whether a dive finds a better incumbent; states that it visits stay visited."""
-        if self.wide.passes == 0 or (np.isinf(below) and self.incumbent):
+        if self.incumbent is None or np.isinf(below):
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()
         rows = trial.way() if trial.dive(threshold, below) else None
