@@ -263,7 +263,8 @@ class ThresholdSearch:
 
         trial.tell = tell
         try:
-            if not self._cuts or trial.dive(floor) or trial.rise(floor):
+            attained = self._cuts and trial.dive(floor) and self._takes(trial)
+            if attained or not self._cuts or trial.whole or trial.rise(floor):
                 return False  # what takes as much as the floor would stay visited below a later cut
         except _TooManyError:
             return False
@@ -281,6 +282,8 @@ class ThresholdSearch:
         below = self._ceiling if self._cuts else np.inf
         while True:
             if self._cuts and self._dives(threshold, below):
+                if self.is_best and self.incumbent:
+                    return self.incumbent
                 threshold = below = self._target
                 continue
             nothing = None
@@ -341,8 +344,14 @@ class ThresholdSearch:
         if self.incumbent is None or np.isinf(below):
             return False  # what lies below a first threshold is seldom all that a path needs
         trial = self.wide.copy()
-        rows = trial.way() if trial.dive(threshold, below) else None
-        if rows:
+        if trial.dive(threshold, below) and self._takes(trial):
+            return True
+        self.wide = trial
+        return False
+
+    def _takes(self, trial: Explorer) -> bool:
+        """Return whether the way of a dive to its end is a better plan, which is then kept."""
+        if rows := trial.way():
             way, best = exact_best(trial, among=rows)
             if best.values[0] < self._ceiling:
                 if not close_fallen(trial, way, best.path):
@@ -351,7 +360,6 @@ class ThresholdSearch:
                 with suppress(InfeasibleError, NothingFoundError):  # of what stands
                     self.incumbent = best_standing(trial)
                     return True
-        self.wide = trial
         return False
 
 
@@ -376,6 +384,8 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
                 break  # it pays where the first one found nothing
             if wider > 1 and search.incumbent and search.misses_floor(problem):
                 break
+            if search.is_best and search.incumbent:
+                return search.incumbent
             plans = [search.incumbent, _first(problem, options, search.floors, wider, tell)]
             search.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
             if search.is_best and search.incumbent:
