@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from experiments.harness.layers import Budget, LayeredCosts, Layers, compile_costs
+from experiments.harness.layers import Budget, LayeredCosts, compile_costs, cost_layers
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
 from seqopt.instances._solve import find_path
 from seqopt.problem.problem import Aim
@@ -49,8 +49,8 @@ class Costs:
 
 def of_layers(problem):
     """The costs of candidates that were computed for a problem."""
-    layers = Layers(problem)
-    return Costs(layers.sums, (), layers.alone, layers.peaks)
+    found = cost_layers(problem)
+    return Costs(found.sums, (), found.alone, found.peaks)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from seqopt.instances.compiled import _pruned
 from seqopt.instances.instance import Instance, _Cap
 from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Problem, RobustAim
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import Move, Schedule
 
 JOIN = {Aim.SUM: np.add, Aim.PEAK: np.maximum}  # how costs go together
 
@@ -240,54 +240,62 @@ def _arcs(columns: Sequence[Blocks], beside: Sequence[Blocks]) -> tuple[Rows, Ro
     return source.astype(np.int32), target.astype(np.int32), amounts, alone
 
 
+@dataclass(frozen=True, eq=False)
 class Layers:
     """The costs of the candidates of all moves of a problem with open grips.
 
-    ``problem``: or its states, of one scenario. ``moves``: of the schedule; ``steps``: of every
-    step with open grips the moves and the costs of their choices, (C,) or (C, D), infinite where
-    they are not allowed.
+    ``moves``: of the schedule; ``steps``: of every step the moves that are open, -1 before the
+    first, and what their choices cost, (C,) or (C, D), infinite where they are not allowed;
+    ``charged``: the same as a search of one move alone is charged.
     """
 
-    def __init__(self, problem: Problem | States) -> None:
-        graph = problem if isinstance(problem, States) else graph_of(problem, Aim.SUM)
-        assert isinstance(graph.rules, Schedule)
-        space, self.moves = graph.space, graph.rules.moves
-        self.sizes = tuple(len(move.candidates) for move in self.moves)
-        self.steps, self._charged = list[Step](), list[Step]()
-        for level, step in enumerate(graph.rules.steps, start=1):
-            if step.moves:
-                choices = space.candidates(level)
-                costs, within = graph.values(level, choices.states)
-                own = costs[:, 0]
-                charged = graph.candidates.charges(level, choices.states).sum(axis=1)
-                found = [choices.spread(np.where(within, each, np.inf)) for each in (own, charged)]
-                own, charged = (np.where(np.isnan(each), np.inf, each) for each in found)
-                self.steps.append((step.moves, own))
-                self._charged.append((step.moves, charged))
-        given = [graph.values(*each)[0][0, 0] for each in space.without_choice()]
-        self._given = [((-1, 0), np.full((1, self.sizes[0]), cost)) for cost in given]
+    moves: Sequence[Move]
+    steps: Sequence[Step]
+    charged: Sequence[Step]
 
     @cached_property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build counts."""
-        return self.joined(np.add, self.steps + self._given)
+        return self.joined(np.add, self.steps)
 
     @cached_property
     def peaks(self) -> LayeredCosts:
         """The costs of which the largest counts."""
-        return self.joined(np.maximum, self.steps + self._given)
+        return self.joined(np.maximum, self.steps)
 
     @cached_property
     def alone(self) -> LayeredCosts:
         """The sums that a search of one move alone is charged."""
-        return self.joined(np.add, self._charged + self._given)
+        return self.joined(np.add, self.charged)
 
     def joined(self, join: np.ufunc, steps: Sequence[Step]) -> LayeredCosts:
         """Return costs of single choices and of pairs from those of steps."""
-        sizes, found = self.sizes, dict[tuple[int, ...], Floats]()
+        sizes = tuple(len(move.candidates) for move in self.moves)
+        found = dict[tuple[int, ...], Floats]()
         for moves, costs in steps:
             found[moves] = join(found[moves], costs) if moves in found else costs
         single = tuple(found.get((k,), np.zeros(size)) for k, size in enumerate(sizes))
         pairs = enumerate(pairwise((1, *sizes)))
         shared = tuple(found.get((k - 1, k), np.zeros(pair)) for k, pair in pairs)
         return LayeredCosts(single, shared)
+
+
+def cost_layers(problem: Problem | States) -> Layers:
+    """Return the costs of all candidates of a problem, or of its states, of one scenario."""
+    graph = problem if isinstance(problem, States) else graph_of(problem, Aim.SUM)
+    assert isinstance(graph.rules, Schedule)
+    space, moves = graph.space, graph.rules.moves
+    steps, every = list[Step](), list[Step]()
+    for level, step in enumerate(graph.rules.steps, start=1):
+        if step.moves:
+            choices = space.candidates(level)
+            costs, within = graph.values(level, choices.states)
+            charged = graph.candidates.charges(level, choices.states).sum(axis=1)
+            found = [choices.spread(np.where(within, c, np.inf)) for c in (costs[:, 0], charged)]
+            own, charged = (np.where(np.isnan(each), np.inf, each) for each in found)
+            steps.append((step.moves, own))
+            every.append((step.moves, charged))
+    first = len(moves[0].candidates)
+    given = [graph.values(*each)[0][0, 0] for each in space.without_choice()]
+    alike = [((-1, 0), np.full((1, first), cost)) for cost in given]
+    return Layers(moves, steps + alike, every + alike)

@@ -36,7 +36,13 @@ from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.layers import LayeredCosts, Layers, best_in_order, compile_totals
+from experiments.harness.layers import (
+    LayeredCosts,
+    Layers,
+    best_in_order,
+    compile_totals,
+    cost_layers,
+)
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
 from formulations.scenario_program import solve_program
@@ -110,7 +116,7 @@ def over_draws(problem: Problem, count: int, seed: int) -> States:
 
 def of_scenarios(graph: States) -> list[LayeredCosts]:
     """Return what candidates cost in every scenario, as its aim counts."""
-    found = map(Layers, graph.each)
+    found = map(cost_layers, graph.each)
     return [own.sums if graph.over.aim is Aim.SUM else own.peaks for own in found]
 
 
@@ -127,7 +133,7 @@ def best(costs: LayeredCosts, aim: Aim) -> Choice:
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
     for criterion in (WORST_RATIO, WEIGHTED):
         problem = posed(scene, criterion)
-        alone = Layers(problem)
+        alone = cost_layers(problem)
         nominal = alone.peaks if criterion is WORST_RATIO else alone.sums
         unseen = of_scenarios(over_draws(problem, effort.unseen, UNSEEN_SEED))
         for seed in range(effort.seeds):
@@ -179,7 +185,7 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
 
 def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
     asked = [posed(scene, criterion) for criterion in (EQUATIONS, WEIGHTED, WORST_RATIO)]
-    (ranks, total, worst), (_, *pair) = map(Layers, asked), asked
+    (ranks, total, worst), (_, *pair) = map(cost_layers, asked), asked
     totals, peaks = (over_draws(problem, count, 0) for problem in pair)
     plans = {
         "rank": best_in_order([(ranks.sums, Aim.SUM)]),
