@@ -5,7 +5,7 @@ A graph of them has a level for every move, and an arc for every pair of candida
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,12 +15,12 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, Rows, _Target, lexicographic
+from seqopt.graph.graph import PEAK, SUM, Graph, Rows, _Target, lexicographic
 from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
 from seqopt.instances.instance import Instance, _Cap
 from seqopt.plan.solve import graph_of
-from seqopt.problem.problem import Aim, Problem, RobustAim
+from seqopt.problem.problem import Aim, Problem
 from seqopt.sequence.schedule import Move, Schedule
 
 JOIN = {Aim.SUM: np.add, Aim.PEAK: np.maximum}  # how costs go together
@@ -89,41 +89,6 @@ class LayeredCosts(FrozenValue):
         return float(reached.min())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Budget(FrozenValue):
-    """A cap on a total over the build.
-
-    ``name``: what is capped, with its unit; ``single``, ``shared``: use of each choice and of each
-    pair, finite, as of `LayeredCosts`; ``bound``: infinite if there is no cap.
-    """
-
-    name: str
-    single: tuple[Floats, ...]
-    shared: tuple[Floats, ...]
-    bound: float
-
-    @property
-    def amounts(self) -> LayeredCosts:
-        """Uses of the budget as costs of choices; made anew each time, as judges need it."""
-        return LayeredCosts(self.single, self.shared)
-
-    def spent(self, choice: Sequence[int]) -> float:
-        """Return the use of the budget by a choice, in its unit."""
-        return self.amounts.cost(choice)
-
-
-def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
-    """Return the largest of several costs of the same moves, choice by choice and pair by pair.
-
-    The largest cost that a choice meets in any of them is the largest that it meets in this one.
-    """
-
-    def largest(every: Iterable[tuple[Floats, ...]]) -> tuple[Floats, ...]:
-        return tuple(np.max(each, axis=0) for each in zip(*every, strict=True))
-
-    return LayeredCosts(largest(c.single for c in layers), largest(c.shared for c in layers))
-
-
 Blocks = Sequence[Floats]
 """What pairs take, (C_{k-1}, C_k) for every move; infinite where they are not allowed."""
 
@@ -143,45 +108,6 @@ class Compiled(NamedTuple):
         return tuple(self.candidates[list(nodes)].tolist())
 
 
-def compile_costs(
-    name: str,
-    costs: LayeredCosts,
-    aim: Aim,
-    budgets: Sequence[Budget] = (),
-    alone: LayeredCosts | None = None,
-) -> Compiled:
-    """Return the graph of choices of which the sum, or the largest cost, is to be least.
-
-    ``alone``: what a search of one move alone is charged: ranks are those among its candidates.
-    Raises `InfeasibleError`, naming the move, if no choice is allowed; `ProblemError` if a budget
-    is for other moves or candidates.
-    """
-    for budget in budgets:
-        if budget.amounts.sizes != costs.sizes:
-            raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
-    said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
-    capped = [budget for budget in budgets if np.isfinite(budget.bound)]
-    columns = [costs.arcs(aim), *(budget.amounts.arcs() for budget in capped)]
-    caps = [_Cap(b.name, k, float(b.bound)) for k, b in enumerate(capped, start=1)]
-    beside = None
-    if alone is not None:
-        pairs = zip(alone.single, alone.shared, strict=True)
-        beside = [np.broadcast_to(own, both.shape) for own, both in pairs], alone.shared
-    names = ["cost", *(budget.name for budget in capped)]
-    return _compiled(name, (names, (_Target(said, kind, (0,)),), tuple(caps)), columns, beside)
-
-
-def compile_totals(name: str, layers: Sequence[LayeredCosts], aim: RobustAim) -> Compiled:
-    """Return the graph of choices with a sum for every scenario, of which an aim makes one value.
-
-    Raises `InfeasibleError` if no choice is allowed in all scenarios.
-    """
-    count = len(layers)
-    goal = _Target(str(aim), TAIL, tuple(range(count)), aim.most(count))
-    asked = [f"cost {k}" for k in range(count)], (goal,), ()
-    return _compiled(name, asked, [each.arcs() for each in layers])
-
-
 def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
     """Return the choice that is best in the first goal, among these in the second, and so on.
 
@@ -191,11 +117,11 @@ def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
     kinds = [PEAK if aim is Aim.PEAK else SUM for _, aim in goals]
     targets = tuple(_Target(f"goal {k + 1}", kind, (k,)) for k, kind in enumerate(kinds))
     asked = [goal.name for goal in targets], targets, ()
-    found = _compiled("goals in order", asked, [costs.arcs(aim) for costs, aim in goals])
+    found = compiled("goals in order", asked, [costs.arcs(aim) for costs, aim in goals])
     return found.choice(lexicographic(found.instance.graph).path)
 
 
-def _compiled(
+def compiled(
     name: str,
     asked: tuple[Sequence[str], tuple[_Target, ...], tuple[_Cap, ...]],
     columns: Sequence[Blocks],

@@ -16,10 +16,8 @@ Inputs: the shipped scenes. Command: ``python -m experiments speed_accuracy [--q
 """
 
 import json
-import platform
 import sys
 import time
-from pathlib import Path
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -104,13 +102,6 @@ def chart(rows: pd.DataFrame) -> Figure:
     return regret_chart(*tables(rows))
 
 
-def machine() -> str:
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
-    model = next((line.split(": ")[1] for line in lines if line.startswith("model name")), "")
-    return f"{model or platform.processor()}, Python {platform.python_version()}"
-
-
 def holds(rows: pd.DataFrame, searches: pd.DataFrame) -> dict[str, bool]:
     """Return whether each part of the claim does."""
     found = {table.scene: table for table in tables(rows)}
@@ -162,7 +153,7 @@ def experiment(options: Options) -> Finding:
     arches = (7,) if options.quick else ARCHES
     some = pd.DataFrame([row for bricks in arches for row in apart(module, "digits", bricks)])
     print(some.to_string(index=False, float_format="%.4g"))
-    kept = {"regret": rows.assign(machine=machine()), "digits": some}
+    kept = {"regret": rows, "digits": some}
     return Finding(holds(rows, some), tables=kept)
 
 

@@ -17,18 +17,14 @@ from dataclasses import replace
 from itertools import product
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.ranks import rank_choice
-from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from seqopt import Problem, three_robot_loop
 from seqopt.plan.solve import graph_of, pose
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
-from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION, published_plan
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
@@ -81,26 +77,6 @@ def holds(table: pd.DataFrame, optimizations: int) -> bool:
     return bool(printed < most < optimizations)
 
 
-@styled
-def chart(table: pd.DataFrame) -> Figure:
-    figure, axes = subplots(3.8)
-    spread = 0.12 * (table.groupby(["first", "among_three"]).cumcount() % 5)
-    axes.plot(table["first"] + spread, table["among_three"], "o", mfc="none", color=GRAY,
-              label="other variant")  # fmt: skip
-    best = table.sort_values(["first", "among_three"]).iloc[[-1]]
-    (before, after), *_ = best[["before_crown", "after_crown"]].to_numpy()
-    for rows, mark, color, label in (
-        (table.iloc[[0]], "s", VERMILION, "equations 2 and 3, as printed"),
-        (best, "^", BLUE, f"best variant: {before};\nafter the crown {after}"),
-    ):
-        axes.plot(rows["first"], rows["among_three"], mark, color=color, ms=9, label=label)
-    axes.set(xlabel="choices of 22 in which the published node ranks first")
-    axes.set(ylabel="choices in which it is\namong the first three")
-    dress(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right center")
-    return figure
-
-
 def experiment(options: Options) -> Finding:
     engine, tried = arch25(), variants()
     every = [Limit(name, math.inf) for name in ("T_max", "M_sup", "D_max")]  # computed once
@@ -115,8 +91,4 @@ def experiment(options: Options) -> Finding:
     return Finding(holds(table, len(problem.schedule.moves)), tables={"criteria_variants": table})
 
 
-CLAIM = Claim(
-    experiment,
-    quick="few variants",
-    pictures={"criteria_variants.png": drawn(chart, "criteria_variants")},
-)
+CLAIM = Claim(experiment, quick="few variants")

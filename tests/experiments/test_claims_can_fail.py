@@ -161,7 +161,7 @@ CHECKS = {
     ),
     "robust_placement": Check(
         robust_placement.holds,
-        ("robust_placement", "robust_programs"),
+        ("robust_placement",),
         *("unseen_robust", 2.0, {"aim": "worst-peak", "scenarios": 30}),
     ),
     **{
