@@ -12,12 +12,10 @@ Method: every vault is a chain of rigid bricks with joints at both abutments. Un
 stiffness is ``k_t`` times a function of ``k_r / k_t``. For a given ratio the best ``k_t`` is known
 in closed form (a weighted median for absolute errors, a quotient for squares), so one search over
 the ratio finds the global optimum, which is computed again with the compliance operator of the
-scene. Every test is also predicted from a fit to the other seven. The confidence region holds all
-pairs whose sum of squares is at most ``1 + p F(p, 8 - 2) / (8 - 2)`` times the smallest, ``p = 2``;
-a profile has ``p = 1``.
+scene. Every test is also predicted from a fit to the other seven. Where the least sum of squares of
+a profile is at most ``1 + F(1, 8 - p) / (8 - p)`` times the smallest is its 95 % interval.
 
-Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
-experiments calibration [--quick]``.
+Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``.
 """
 
 import numpy as np
@@ -109,12 +107,6 @@ def _paired(gains: Floats) -> list[tuple[str, float, float]]:
     named = {GAIN: mean, "standard error of that": error}
     named |= {GAIN_LOW: mean - reach, GAIN_HIGH: mean + reach}
     return [(name, value, np.nan) for name, value in named.items()]
-
-
-def threshold(numbers: int, fitted: int, count: int = 8) -> float:
-    """Return the border of a region of ``numbers`` of the fitted ones, over the least sum."""
-    rest = count - fitted
-    return float(1 + numbers * stats.f.ppf(LEVEL, numbers, rest) / rest)
 
 
 def interval(values: Floats, sums: Floats, limit: float) -> tuple[float, float]:
@@ -212,7 +204,8 @@ def profiles(law: Law) -> dict[str, tuple[Floats, Floats]]:
 
 def intervals(law: Law) -> dict[str, float]:
     """Return the 95 % profile intervals of k_t and k_r; an open end is 0 or infinite."""
-    limit = threshold(1, 1 if law.bounds[0] == law.bounds[1] else 2)
+    rest = len(law.tests) - (1 if law.bounds[0] == law.bounds[1] else 2)
+    limit = float(1 + stats.f.ppf(LEVEL, 1, rest) / rest)
     out = {}
     for name, (values, sums) in profiles(law).items():
         out[f"{name}_from"], out[f"{name}_to"] = interval(values, sums, limit)

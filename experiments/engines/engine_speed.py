@@ -3,10 +3,8 @@
 That is the frame that checks it. The lowest ratio of a round is stored beside the median and has to
 be 100 at least: a round in which the machine was busy elsewhere was seen at 541.
 
-Method: on `arch25` with 17 bricks, random sets of three grips, every edge force and every node
-displacement; both engines take turns in one process on one core.
-
-Inputs: the shipped scene; seed 0. Command: ``python -m experiments engine_speed [--quick]``.
+Method: on `arch25` with 17 bricks, random sets of three grips (seed 0), every edge force and every
+node displacement; both engines take turns in one process on one core.
 """
 
 from collections.abc import Mapping

@@ -18,9 +18,6 @@ scenario must change nothing. These bounds were set after a first look at six of
 The claim rests on how uncertain each is taken to be: at the same relative size weights change as
 many grips as stiffness does or more (within 10 % weights move 15 % of them under equations 2 and 3,
 stiffness 9 %). Single draws spread widely about the means. And one arch is one arch.
-
-Inputs: the shipped scene. Command: ``python -m experiments decision_sensitivity
-[--quick]``.
 """
 
 import math

@@ -10,8 +10,6 @@ three robots and further mobile ones. Every run has a process of its own on one 
 1.7 GB for states, moves and responses beside what the program takes without any; seconds of that
 core are counted, and the largest memory of the process. Exponents are fitted over 25 bricks and
 more, where a plan is proven.
-
-Inputs: the shipped scenes. Command: ``python -m experiments free_growth [--quick]``.
 """
 
 import json

@@ -15,8 +15,6 @@ seed, at a price of at most a quarter in the nominal scene; totals over unseen s
 3 % of the nominal plan's; no plan beats the one that knows each scenario. These bounds were set
 after a first look at two of the seeds and 60 unseen scenarios. One arch is one arch, and how far
 scenarios spread is taken, not measured.
-
-Inputs: the shipped scene. Command: ``python -m experiments robust_placement [--quick]``.
 """
 
 from __future__ import annotations

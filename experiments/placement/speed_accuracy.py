@@ -11,8 +11,6 @@ decide where they can changes no plan, and on a large arch every search is soone
 Method: what ``seqopt compare --speed`` measures, all ways in two minutes a scene, in processor time
 from the scene to the plan. Every scene has a process of its own on one core. Nothing is random.
 Beside it searches without proof in turn with an engine that gives all digits whatever is enough.
-
-Inputs: the shipped scenes. Command: ``python -m experiments speed_accuracy [--quick]``.
 """
 
 import json

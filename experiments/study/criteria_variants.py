@@ -7,9 +7,6 @@ three. Variants: which responses are ranked before and after the crown, up to wh
 first set holds, and to what responses are rounded before they are ranked. Which variant comes
 closest was seen after all were tried on the one plan there is: it describes that plan and predicts
 nothing.
-
-Inputs: the shipped scene and plan. Command: ``python -m experiments criteria_variants
-[--quick]``.
 """
 
 import math
@@ -28,10 +25,6 @@ from seqopt.problem.requirements import Limit
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION, published_plan
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
-
-
-def _places(ranks: pd.Series) -> dict[str, object]:
-    return {"first": int((ranks == 1).sum()), "among_three": int((ranks <= 3).sum())}
 
 
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
@@ -68,7 +61,8 @@ def scores(problem: Problem, criteria: list[RankSum]) -> pd.DataFrame:
         ranks = rank_choice(replace(graph, criterion=criterion), nodes)["rank_in_window"]
         before, after, crown, rounded = criterion.name.split(" | ")
         row = {"before_crown": before, "after_crown": after, "after_from_brick": int(crown)}
-        rows.append(row | {"rounded_to": float(rounded), **_places(ranks)})
+        row |= {"rounded_to": float(rounded), "first": int((ranks == 1).sum())}
+        rows.append(row | {"among_three": int((ranks <= 3).sum())})
     return pd.DataFrame(rows)
 
 
