@@ -178,11 +178,7 @@ def best(*cell: object) -> dict[str, object]:
 
 
 def limited(memory: float, most: float) -> None:
-    """Let this process have so much memory, and end what it does after so many seconds, twice.
-
-    Its clock is that of the processor, which others may use too.
-    """
-    time.perf_counter = time.process_time
+    """Let this process have so much memory, and end what it does after so many seconds, twice."""
 
     def end(*_: object) -> None:
         raise KeyboardInterrupt  # a proof that is interrupted leaves a plan without it
