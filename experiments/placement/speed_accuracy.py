@@ -1,12 +1,12 @@
 """Claim: the free schedule is proven best soon; what a model leaves out costs more than a search.
 
 On five scenes, the reference arch, with grips of 1e6 N/m, and laid dry, a barrel vault and a wall,
-what README says to take proves that no plan of the free schedule has a lower worst step. On the
-arch with rigid and with soft grips other ways are sooner, and lose at least a few percent. With
-soft grips, plans that were chosen for rigid ones are at least twice as bad, and so are those of the
-loop chosen by ranks. Laid dry, plans fall unless it is asked that they stand. Where a stiff-bar
-frame answers, it takes at least five times as long as rigid bricks the same way. That six digits
-decide where they can changes no plan, and on a large arch every search is sooner by it.
+what README says to take proves that no plan of the free schedule has a lower worst step. With soft
+grips and on the wall other ways are sooner, and lose at least a percent. With soft grips, plans
+that were chosen for rigid ones are at least twice as bad, and so are those of the loop chosen by
+ranks. Laid dry, plans fall unless it is asked that they stand. Where a stiff-bar frame answers, it
+takes at least five times as long as rigid bricks the same way. That six digits decide where they
+can changes no plan, and on a large arch every search is sooner by it.
 
 Method: what ``seqopt compare --speed`` measures, all ways in two minutes a scene, in processor time
 from the scene to the plan. Every scene has a process of its own on one core. Nothing is random.
@@ -14,8 +14,10 @@ Beside it searches without proof in turn with an engine that gives all digits wh
 """
 
 import json
+import signal
 import sys
 import time
+from contextlib import contextmanager
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -33,7 +35,8 @@ from seqopt.sequence.rules import FREE, FreeRules
 
 ARCH, SOFT, DRY = "arch25", "arch25, soft grips", "arch25, laid dry"
 BARREL = "barrel vault"  # the first of the tested vaults
-SCENES = (ARCH, SOFT, DRY, BARREL, "wall:columns=4,courses=3")
+WALL = "wall:columns=4,courses=3"
+SCENES = (ARCH, SOFT, DRY, BARREL, WALL)
 QUICK = ("wall:columns=2,courses=2",)
 LIMIT, QUICK_LIMIT = 120.0, 10.0  # s for all ways
 GRIPS, CRITERION = 1e6, "equations-2-3"
@@ -46,12 +49,34 @@ SEARCHES = {
 ABOUT = ["scene", "bricks", "reference", "valued", "worst", "limit"]
 
 
+@contextmanager
+def within(seconds: float):
+    """Raise a `TimeoutError` from a block that takes longer, in processor time."""
+    late = []
+
+    def end(*_: object) -> None:
+        late.append(True)
+        raise KeyboardInterrupt  # which nobody takes for an error of the block
+
+    signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, max(seconds, 1e-3))
+    try:
+        yield
+    except KeyboardInterrupt:
+        if late:
+            raise TimeoutError from None
+        raise
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
 def measured(name: str, seconds: float) -> RegretTable:
     first = name.partition(", ")[0] if name in (SOFT, DRY) else name
     scene = barrel_vault(1) if name == BARREL else seqopt.load_scene(first)
     scene = scene.with_grips(GRIPS) if name == SOFT else scene
     engine = seqopt.make_engine("auto", scene, "dry" if name == DRY else None)
-    timer = Timer(time.process_time)
+    time.perf_counter = time.process_time  # limits are of this process, too, whoever else works
+    timer = Timer(time.process_time, within)
     return measure_regret(engine, seqopt.CRITERIA[CRITERION], seconds=seconds, timer=timer)
 
 
@@ -122,8 +147,8 @@ def holds(rows: pd.DataFrame, searches: pd.DataFrame) -> dict[str, bool]:
         worse = soft[(soft["engine"] == RIGID_GRIPS) & (soft["without"] == "")]
         ranks = soft.loc[soft["without"] == "ranks", "regret"]
         parts |= {
-            "a sooner way loses something on the arch with rigid and with soft grips": all(
-                (found[name].sooner["regret"] > 0).any() for name in (ARCH, SOFT)
+            "a sooner way loses something with soft grips and on the wall": all(
+                (found[name].sooner["regret"] >= 0.01).any() for name in (SOFT, WALL)
             ),
             "plans for rigid grips, and plans by ranks, are twice as bad with soft ones": bool(
                 (worse["regret"] >= 1).all() and len(worse) == 2 and (ranks >= 1).all()
