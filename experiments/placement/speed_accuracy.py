@@ -52,20 +52,12 @@ ABOUT = ["scene", "bricks", "reference", "valued", "worst", "limit"]
 @contextmanager
 def within(seconds: float):
     """Raise a `TimeoutError` from a block that takes longer, in processor time."""
-    late = []
-
-    def end(*_: object) -> None:
-        late.append(True)
-        raise KeyboardInterrupt  # which nobody takes for an error of the block
-
-    signal.signal(signal.SIGPROF, end)
+    signal.signal(signal.SIGPROF, signal.default_int_handler)  # no error of the block itself
     signal.setitimer(signal.ITIMER_PROF, max(seconds, 1e-3))
     try:
         yield
     except KeyboardInterrupt:
-        if late:
-            raise TimeoutError from None
-        raise
+        raise TimeoutError from None
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 

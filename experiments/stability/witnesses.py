@@ -196,7 +196,6 @@ def faults(table: pd.DataFrame, witnesses: list[str], ratio: float | None) -> li
 
 def report(table: pd.DataFrame, witnesses: list[str]) -> None:
     print(table.drop(columns="group").to_string(index=False, float_format="%.3g", na_rep=""))
-    print(f"undecided by us: {(table['ours'] == OPEN).sum()} of {len(table)}")
     for witness in witnesses:
         agree, differs = (words(table, witness) == table["ours"]).sum(), differing(table, witness)
         asked = (table[witness] != "").sum()
