@@ -163,7 +163,7 @@ def chart(contest: pd.DataFrame, library: pd.DataFrame) -> Figure:
     for axes, column, limits in ((times, "closing", TIMES), (left, "left", GAPS)):
         _profiles(axes, _by_way(runs, column), limits, count)
     times.set(xlabel="processor time [s]", title="closed by its own bound within a time")
-    left.set(xlabel="gap to its own bound, of its value", title="not more left when its run ended")
+    left.set(xlabel="gap to its own bound, of its value", title="not more left at the end")
     times.set(ylabel=f"share of all {count} instances [%]")
     dress(times, left)
     name_panels(times, left)
