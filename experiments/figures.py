@@ -6,8 +6,6 @@ of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
-
-Inputs: the shipped scenes and tables. Command: ``python -m experiments figures [--quick]``.
 """
 
 import io

@@ -12,6 +12,7 @@ from seqopt.engines.interface import _NAMES, Fields, Want
 from seqopt.engines.rigid.compliance import ACCURACY, _FastSolution
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, _check_part
@@ -34,6 +35,30 @@ def solve_batch(operator, columns, want=Want.RESPONSES, *, even=True, accuracy=A
 def six_bricks(pattern="VLR"):
     """An arch of six bricks, closed at both ends."""
     return arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern))
+
+
+SPRING = {
+    "along": (0.0, 0.0, 1.0),
+    "across": (1.0, 0.0, 0.0),
+    "translational_stiffness": (3e8, 2e8, 1e8),
+    "rotational_stiffness": (2e6, 1e6, 3e6),
+}
+
+
+def running_bond(columns, courses):
+    """Return a wall of courses, every second one shifted by half a brick, open between bricks.
+
+    Joints have one stiffness each, whatever their area: three different ones along their axes.
+    """
+    robots = tuple(Robot(name=f"rob{i}", payload=400.0) for i in (1, 2, 3))
+    scene = wall(WallShape(columns=columns, courses=courses)).with_robots(*robots)
+    beds = (joint for joint in scene.joints if abs(joint.along[2]) > 0.5)
+    return replace(
+        scene,
+        joints=tuple(replace(joint, **SPRING) for joint in beds),
+        grounds=tuple(replace(ground, **SPRING) for ground in scene.grounds),
+        provenance="",
+    )
 
 
 def small_arch(count):

@@ -2,15 +2,94 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 
-from experiments.harness.layers import Budget, LayeredCosts, Layers, compile_costs
+from experiments.harness.layers import Compiled, LayeredCosts, compiled, cost_layers
+from seqopt.arrays import Floats, FrozenValue
+from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
+from seqopt.graph.graph import PEAK, SUM, TAIL, _Target
 from seqopt.instances._solve import find_path
-from seqopt.problem.problem import Aim
+from seqopt.instances.instance import _Cap
+from seqopt.problem.problem import Aim, RobustAim
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Budget(FrozenValue):
+    """A cap on a total over the build.
+
+    ``name``: what is capped, with its unit; ``single``, ``shared``: use of each choice and of each
+    pair, finite, as of `LayeredCosts`; ``bound``: infinite if there is no cap.
+    """
+
+    name: str
+    single: tuple[Floats, ...]
+    shared: tuple[Floats, ...]
+    bound: float
+
+    @property
+    def amounts(self) -> LayeredCosts:
+        """Uses of the budget as costs of choices; made anew each time, as judges need it."""
+        return LayeredCosts(self.single, self.shared)
+
+    def spent(self, choice: Sequence[int]) -> float:
+        """Return the use of the budget by a choice, in its unit."""
+        return self.amounts.cost(choice)
+
+
+def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
+    """Return the largest of several costs of the same moves, choice by choice and pair by pair.
+
+    The largest cost that a choice meets in any of them is the largest that it meets in this one.
+    """
+
+    def largest(every: Iterable[tuple[Floats, ...]]) -> tuple[Floats, ...]:
+        return tuple(np.max(each, axis=0) for each in zip(*every, strict=True))
+
+    return LayeredCosts(largest(c.single for c in layers), largest(c.shared for c in layers))
+
+
+def compile_costs(
+    name: str,
+    costs: LayeredCosts,
+    aim: Aim,
+    budgets: Sequence[Budget] = (),
+    alone: LayeredCosts | None = None,
+) -> Compiled:
+    """Return the graph of choices of which the sum, or the largest cost, is to be least.
+
+    ``alone``: what a search of one move alone is charged: ranks are those among its candidates.
+    Raises `InfeasibleError`, naming the move, if no choice is allowed; `ProblemError` if a budget
+    is for other moves or candidates.
+    """
+    for budget in budgets:
+        if budget.amounts.sizes != costs.sizes:
+            raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
+    said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
+    capped = [budget for budget in budgets if np.isfinite(budget.bound)]
+    columns = [costs.arcs(aim), *(budget.amounts.arcs() for budget in capped)]
+    caps = [_Cap(b.name, k, float(b.bound)) for k, b in enumerate(capped, start=1)]
+    beside = None
+    if alone is not None:
+        pairs = zip(alone.single, alone.shared, strict=True)
+        beside = [np.broadcast_to(own, both.shape) for own, both in pairs], alone.shared
+    names = ["cost", *(budget.name for budget in capped)]
+    return compiled(name, (names, (_Target(said, kind, (0,)),), tuple(caps)), columns, beside)
+
+
+def compile_totals(name: str, layers: Sequence[LayeredCosts], aim: RobustAim) -> Compiled:
+    """Return the graph of choices with a sum for every scenario, of which an aim makes one value.
+
+    Raises `InfeasibleError` if no choice is allowed in all scenarios.
+    """
+    count = len(layers)
+    goal = _Target(str(aim), TAIL, tuple(range(count)), aim.most(count))
+    asked = [f"cost {k}" for k in range(count)], (goal,), ()
+    return compiled(name, asked, [each.arcs() for each in layers])
 
 
 @dataclass(frozen=True)
@@ -49,8 +128,8 @@ class Costs:
 
 def of_layers(problem):
     """The costs of candidates that were computed for a problem."""
-    layers = Layers(problem)
-    return Costs(layers.sums, (), layers.alone, layers.peaks)
+    found = cost_layers(problem)
+    return Costs(found.sums, (), found.alone, found.peaks)
 
 
 @dataclass(frozen=True)

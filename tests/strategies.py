@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from experiments.harness.layers import Budget, LayeredCosts
-from experiments.harness.scenes import running_bond
+from experiments.harness.layers import LayeredCosts
 from seqopt.scene._checks import as_vectors
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import vertices_of
@@ -16,8 +15,8 @@ from seqopt.scene.parts import Anywhere, Load, Prop, Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
 from seqopt.study import ROBOTS
-from tests.builders import about_vertical, from_both_sides, moved
-from tests.layered import Costs
+from tests.builders import about_vertical, from_both_sides, moved, running_bond
+from tests.layered import Budget, Costs
 
 angles = st.floats(-0.3, 0.3)
 

@@ -23,6 +23,7 @@ def stated() -> dict[str, str]:
     return (
         {"questions_table": _questions(every), "refused_table": _refused(every)}
         | _taken(stored("regret"))
+        | _digits(stored("digits"))
         | _heuristics(stored("heuristic_gaps"))
         | _outside(stored("outside_assemblies"))
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
@@ -140,6 +141,14 @@ def _taken(rows: pd.DataFrame) -> dict[str, str]:
         "rigid_proof_s": two(took["compliance", "loop", "overlap_dp", "ranks"]),
         "frame_times": two(took["frame", *search] / took["compliance", *search]),
     }
+
+
+def _digits(rows: pd.DataFrame) -> dict[str, str]:
+    """Return how many times as long searches take with all digits as where six may decide."""
+    times = (rows["all_s"] / rows["six_s"]).groupby(rows["bricks"])
+    least, most = times.min(), times.max()
+    spans = {bricks: f"{two(least[bricks])} to {two(most[bricks])}" for bricks in least.index}
+    return {"digits_small": spans[min(spans)], "digits_large": spans[max(spans)]}
 
 
 def _heuristics(gaps: pd.DataFrame) -> dict[str, str]:

@@ -12,12 +12,10 @@ Method: every vault is a chain of rigid bricks with joints at both abutments. Un
 stiffness is ``k_t`` times a function of ``k_r / k_t``. For a given ratio the best ``k_t`` is known
 in closed form (a weighted median for absolute errors, a quotient for squares), so one search over
 the ratio finds the global optimum, which is computed again with the compliance operator of the
-scene. Every test is also predicted from a fit to the other seven. The confidence region holds all
-pairs whose sum of squares is at most ``1 + p F(p, 8 - 2) / (8 - 2)`` times the smallest, ``p = 2``;
-a profile has ``p = 1``.
+scene. Every test is also predicted from a fit to the other seven. Where the least sum of squares of
+a profile is at most ``1 + F(1, 8 - p) / (8 - p)`` times the smallest is its 95 % interval.
 
-Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
-experiments calibration [--quick]``.
+Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``.
 """
 
 import numpy as np
@@ -32,22 +30,19 @@ from experiments.calibration.parts.barrel_vaults import (
     LAWS,
     MEASURES,
     Law,
-    Vault,
     chain,
     errors,
     fit,
     laws,
-    planar_parts,
     vaults,
 )
 from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.results import stored
+from experiments.harness.results import drawn
 from seqopt.arrays import Floats
-from seqopt.report._style import BLUE, GREEN, ORANGE, VERMILION, dress, name_panels, plain, styled
+from seqopt.report._style import BLUE, VERMILION, dress, name_panels, styled
 
 LEVEL = 0.95
-ACROSS = {"rigid": 0.0, "as stiff as along": 1.0, "a tenth as stiff": 10.0}  # compliance ratio
 DECISIVE = 5  # the test whose error the paper's column owes most of its mean to
 IN_SAMPLE, ANEW = "mean absolute error, all tests fitted", "law chosen anew for each test left out"
 GAIN = "mean gain over the paper, paired"
@@ -77,12 +72,6 @@ def chosen_anew(models: dict[str, Law]) -> tuple[list[str], Floats]:
     return names, np.array(out)
 
 
-def bed(tests: tuple[Vault, ...], across: str) -> Law:
-    """Return the bed of springs with joints so stiff across."""
-    chains = map(barrel.chain, tests)
-    return Law(BED, tests, tuple(planar_parts(c, ACROSS[across]) for c in chains))
-
-
 def mean_size(error: Floats) -> float:
     return float(100 * np.abs(error).mean())
 
@@ -108,12 +97,6 @@ def comparison(models: dict[str, Law]) -> pd.DataFrame:
         (f"{squares}, each test left out", left, root),
         *_paired(100 * (np.abs(paper) - np.abs(own))),
     ]
-    for across in ACROSS:
-        varied = bed(law.tests, across)
-        inside = errors(varied, fit(varied, "absolute", whole(varied)))
-        rows += [(f"{across} across, all tests fitted", mean_size(inside), size)]
-        outside = left_out(varied, "absolute")[1]
-        rows += [(f"{across} across, each test left out", mean_size(outside), size)]
     return pd.DataFrame(rows, columns=["what", "bed_percent", "paper_percent"])
 
 
@@ -124,12 +107,6 @@ def _paired(gains: Floats) -> list[tuple[str, float, float]]:
     named = {GAIN: mean, "standard error of that": error}
     named |= {GAIN_LOW: mean - reach, GAIN_HIGH: mean + reach}
     return [(name, value, np.nan) for name, value in named.items()]
-
-
-def threshold(numbers: int, fitted: int, count: int = 8) -> float:
-    """Return the border of a region of ``numbers`` of the fitted ones, over the least sum."""
-    rest = count - fitted
-    return float(1 + numbers * stats.f.ppf(LEVEL, numbers, rest) / rest)
 
 
 def interval(values: Floats, sums: Floats, limit: float) -> tuple[float, float]:
@@ -150,10 +127,6 @@ def _crossing(values: Floats, sums: Floats, between: tuple[int, int], border: fl
     return float(values[a] ** (1 - share) * values[b] ** share)
 
 
-LOOKS = {"b t": (ORANGE, "--"), "b t2": (GREEN, ":"), "b t3/12": (BLUE, "-")}
-TEXTS = {"b t": "$b\\,t$", "b t2": "$b\\,t^2$", "b t3/12": "$b\\,t^3/12$"}
-MARKS = {"absolute": ("o", BLUE), "squares": ("s", VERMILION)}
-Pairs = dict[str, list[tuple[float, float]]]
 SERIES = {
     "paper_percent": ("Bruun et al.", {"color": "0.6"}),
     "fit_percent": ("fit, mean size least", {"color": BLUE}),
@@ -162,22 +135,12 @@ SERIES = {
 
 
 @styled
-def chart(
-    bed: pd.DataFrame,
-    fits: pd.DataFrame,
-    *,
-    region: tuple[Floats, Floats, Floats],
-    levels: tuple[float, float],
-    outs: Pairs,
-    profiles: dict[str, tuple[Floats, Floats]],
-) -> Figure:
-    figure, grid = subplots(6.8, 2, 2)
-    absolute = bed[bed["measure"] == "absolute"]
-    _stiffness(grid[0, 0], absolute)
-    _bars(grid[0, 1], absolute)
-    _region(grid[1, 0], region, levels, outs, fits[fits["law"] == "b t3/12"])
-    _profiles(grid[1, 1], profiles, levels[0])
-    name_panels(*grid.ravel())
+def chart(rows: pd.DataFrame) -> Figure:
+    figure, (left, right) = subplots(3.6, 1, 2)
+    own = rows[(rows["law"] == BED) & (rows["measure"] == "absolute")]
+    _stiffness(left, own)
+    _bars(right, own)
+    name_panels(left, right)
     return figure
 
 
@@ -213,53 +176,6 @@ def _bars(axes: Axes, table: pd.DataFrame) -> None:
     axes.legend(loc="upper right")
 
 
-def _region(
-    axes: Axes,
-    region: tuple[Floats, Floats, Floats],
-    levels: tuple[float, float],
-    outs: Pairs,
-    fits: pd.DataFrame,
-) -> None:
-    k_t, k_r, sums = region
-    best = sums.min()
-    x, y = k_t / 1e9, k_r / 1e9
-    axes.contourf(x, y, sums.T / best, levels=[0, levels[1]], colors=["0.9"])
-    axes.contour(x, y, sums.T / best, levels=[levels[1]], colors=["k"], linewidths=1.0)
-    axes.plot(x, x, color="k", lw=0.8, ls=":")
-    note(axes, "$k_r = k_t$", (118, 128), (0, 0), rotation=56, rotation_mode="anchor")
-    for row in fits.to_dict("records"):
-        mark, color = MARKS[str(row["measure"])]
-        pairs = np.array(outs[str(row["measure"])]) / 1e9
-        word = "mean absolute error" if row["measure"] == "absolute" else "sum of squares"
-        pair = (float(row["k_t"]) / 1e9, float(row["k_r"]) / 1e9)
-        axes.plot(*pair, mark, color=color, ms=9, ls="none", label=f"least {word}")
-        look = {"mfc": "w", "color": color, "label": "the same without a test"}
-        axes.plot(*pairs.T, mark, ms=4.5, **look)
-        for i in np.flatnonzero(np.abs(np.log(pairs / pair)).max(axis=1) > 0.3):
-            spot, shift = tuple(pairs[i]), (-5, 6) if row["measure"] == "absolute" else (4, 5)
-            axes.annotate(str(i + 1), spot, shift, textcoords="offset points", color=color)
-    axes.set(xscale="log", yscale="log", xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    ticks([20, 50, 100, 200, 500, 1000], axes.xaxis)
-    ticks([50, 100, 200, 500], axes.yaxis)
-    axes.set(xlabel="$k_t$ [10⁶ kN/m³]", ylabel="$k_r$, per second moment\nof area [10⁶ kN/m³]")
-    axes.set(title="95 % region (gray); numbers: test left out")
-    axes.legend(loc="upper right", frameon=True, framealpha=1, edgecolor="none")
-
-
-def _profiles(axes: Axes, profiles: dict[str, tuple[Floats, Floats]], level: float) -> None:
-    for law, (turn, sums) in profiles.items():
-        color, dashes = LOOKS[law]
-        axes.plot(turn / 1e6, sums, color=color, ls=dashes, label=f"stiffness ∝ {TEXTS[law]}")
-        axes.axhline(level * sums.min(), color=color, lw=0.8, ls=dashes)
-    axes.set(xscale="log", xlim=(10, 1e4), ylim=(0, 3.6))
-    plain(axes.xaxis)
-    axes.set_xlabel("rotational stiffness of a joint\n215 mm thick [MN m/rad per m]")
-    axes.set_ylabel("least sum of squared\nrelative errors")
-    axes.set_title("profile of squares; level: 95 % limit")
-    dress(axes)
-    axes.legend(loc="upper right")
-
-
 def turning_share(law: Law, pair: tuple[float, float]) -> Floats:
     """Return d ln k / d ln k_r (T,); that of k_t is one minus it."""
     step = 1e-4
@@ -288,7 +204,8 @@ def profiles(law: Law) -> dict[str, tuple[Floats, Floats]]:
 
 def intervals(law: Law) -> dict[str, float]:
     """Return the 95 % profile intervals of k_t and k_r; an open end is 0 or infinite."""
-    limit = threshold(1, 1 if law.bounds[0] == law.bounds[1] else 2)
+    rest = len(law.tests) - (1 if law.bounds[0] == law.bounds[1] else 2)
+    limit = float(1 + stats.f.ppf(LEVEL, 1, rest) / rest)
     out = {}
     for name, (values, sums) in profiles(law).items():
         out[f"{name}_from"], out[f"{name}_to"] = interval(values, sums, limit)
@@ -343,21 +260,9 @@ def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
     return bool(leads and unsure and own[ANEW] > paper[ANEW])
 
 
-def picture() -> Figure:
-    models = laws(vaults())
-    bed = models[BED]
-    k_t, k_r = np.geomspace(1e10, 2e12, 161), np.geomspace(3e10, 1e12, 161)
-    joint = next(v for v in bed.tests if v.thickness == 0.215)
-    curves = {}
-    for label, section in LAWS.items():
-        values, sums = profiles(models[label])["k_r"]
-        curves[label] = (values * section(joint) / joint.width, sums)
-    region = (k_t, k_r, squares(bed, k_t[:, None], k_r))
-    outs = {measure: left_out(bed, measure)[0] for measure in MEASURES}
-    levels = threshold(1, 2), threshold(2, 2)
-    rows, fits = stored("calibration"), stored("calibration_fits")
-    bed_rows = rows[rows["law"] == BED]
-    return chart(bed_rows, fits, region=region, levels=levels, outs=outs, profiles=curves)
-
-
-CLAIM = Claim(experiment, digits=4, quick="no intervals", pictures={"calibration.png": picture})
+CLAIM = Claim(
+    experiment,
+    digits=4,
+    quick="no intervals",
+    pictures={"calibration.png": drawn(chart, "calibration")},
+)

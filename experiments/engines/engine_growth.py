@@ -17,7 +17,7 @@ system at up to forty steps of the plan, and at random sets of three grips as th
 Exponents are fitted over 100 bricks and more; of memory what the smallest run takes is taken off,
 libraries above all.
 
-Inputs: the shipped scenes; seed 0. Command: ``python -m experiments engine_growth [--quick]``.
+Inputs: the shipped scenes; seed 0.
 """
 
 import json

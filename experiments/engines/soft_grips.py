@@ -7,8 +7,6 @@ moves the structure less than a tenth as far as the sequential one. The claim fa
 so, if the cantilever still has less than half with grips of 1e6 N/m, if both are within their
 payloads with rigid grips or one is not with grips of 1e6 N/m, or if the free plan is not the one
 that moves least at 1e6 N/m.
-
-Inputs: the shipped scene. Command: ``python -m experiments soft_grips [--quick]``.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

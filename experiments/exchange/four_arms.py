@@ -10,7 +10,7 @@ arm holds some time, and has joint values in every task but that of picking.
 
 Inputs: the wall's generator, the stored scene of the vault, the models in compas_fab. With
 ``--store`` the folders of ``docs/examples/four_arms`` are written, each with scene, plan, tasks and
-film, and the picture of both.
+film.
 Command: ``python -m experiments four_arms [--quick] [--films]``.
 """
 
@@ -22,21 +22,17 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 from PIL import Image
 
 import seqopt
-from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
 from experiments.harness.results import FIGURES
 from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
-from seqopt.report._pictures import VIEW, _build_box, steps_picture
-from seqopt.report._robots import Arms, Cell
-from seqopt.report._style import styled
-from seqopt.report.draw import _draw_robots, draw_bricks, draw_grips
+from seqopt.report._pictures import steps_picture
+from seqopt.report._robots import Arms
 from seqopt.scene.arm import Arm
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot
@@ -48,7 +44,6 @@ COLORS = 128  # of a film: less than half the bytes
 ABB = "compas_fab:data/robot_library/abb_irb4600_40_255/urdf/robot_description.urdf"
 PAYLOAD = 390.0  # N
 FILES = ("plan.csv", "tasks.json", "tasks.csv")
-SHOWN = {"wall": (8, 19, 28), "vault": (12, 22, 46)}  # steps in the picture
 
 
 def armed(scene: Scene, west: float, east: float, aside: float, tool: float) -> Scene:
@@ -163,40 +158,22 @@ def stored_build(name: str) -> tuple[Scene, tuple[Step, ...], Arms]:
     return scene, steps, arms
 
 
-@styled
-def chart() -> Figure:
-    figure, panels = subplots(4.4, 2, 3)
-    for row, name in zip(panels, SCENES, strict=True):
-        scene, steps, arms = stored_build(name)
-        cell, network = Cell(scene, arms), seqopt.build_network(scene)
-        low, high = _build_box(cell)
-        for axes, number in zip(row, SHOWN[name], strict=True):
-            step = steps[number - 1]
-            _draw_robots(axes, cell, cell.arms(step, number - 1), VIEW)
-            draw_bricks(axes, network, step.bricks, VIEW)
-            draw_grips(axes, network, step.grips, VIEW, named=False)
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-            axes.set_title(f"{name}, step {number} of {len(steps)}", loc="center")
-    return figure
-
-
 def draw_films() -> None:
     """Write the film of every example into its folder."""
     for name in SCENES:
         scene, steps, arms = stored_build(name)
         engine = seqopt.make_engine("compliance", scene)
-        frames = [_frame(steps_picture(engine, steps, s.number, arms=arms)) for s in steps]
+        frames = []
+        for step in steps:
+            shown = io.BytesIO()
+            picture = steps_picture(engine, steps, step.number, arms=arms)
+            picture.savefig(shown, format="png", dpi=65)
+            frames.append(Image.open(shown).convert("RGB"))
         colors = frames[len(frames) // 2].quantize(COLORS, Image.Quantize.FASTOCTREE)
         first, *more = (f.quantize(palette=colors, dither=Image.Dither.NONE) for f in frames)
         path = EXAMPLES / name / "film.gif"
         first.save(path, save_all=True, append_images=more, loop=0, optimize=True, duration=400)
         print("drawn:", path.name)
-
-
-def _frame(figure: Figure) -> Image.Image:
-    shown = io.BytesIO()
-    figure.savefig(shown, format="png", dpi=65)
-    return Image.open(shown).convert("RGB")
 
 
 def experiment(options: Options) -> Finding | None:
@@ -226,5 +203,4 @@ CLAIM = Claim(
         Extra("pinocchio", "pip install 'seqopt[arms]'"),
         Extra("compas_fab", "pip install compas_fab"),
     ),
-    pictures={"four_arms.png": chart},
 )

@@ -67,11 +67,6 @@ class Outside:
     words: tuple[str, ...] = ("--unit", "m", "--density", "2400")
     asked: tuple[str, ...] = ()  # of ``seqopt optimize``
 
-    @property
-    def name(self) -> str:
-        """Short, and its own among all."""
-        return f"{self.source.split()[0]}: {self.path}"
-
 
 OVERLAP = "--accept-overlaps"  # blocks that were curved run into each other by up to 92 mm
 
@@ -247,7 +242,7 @@ def experiment(options: Options) -> Finding:
             continue
         with tempfile.TemporaryDirectory() as folder:
             rows.append(row_of(outside, path, Path(folder)))
-        print(f"{outside.name:60} {rows[-1]['outcome']}: {rows[-1]['said']}", flush=True)
+        print(f"{outside.path:60} {rows[-1]['outcome']}: {rows[-1]['said']}", flush=True)
     table = pd.DataFrame(rows) if options.quick else beside_stored(pd.DataFrame(rows))
     plans = int((table["outcome"] == PLAN).sum())
     good, note = holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans"

@@ -11,9 +11,6 @@ there: a mechanism is called one, and a solver that fails is a counted failure, 
 Method, steps: builds of three arches, with two mortars, over friction and tilt. Every verdict of
 `seqopt.stability` is held against two linear programs that share nothing with it, with polyhedra
 inside and around the cones: where they decide, they must agree, and they must decide nearly all.
-
-Inputs: generated chains, the shipped scene. Command: ``python -m experiments where_methods_fail
-[--quick]``.
 """
 
 import json
@@ -161,13 +158,10 @@ def color(row: pd.Series) -> int:
     return len(SHADES) + (1 if row["mechanism"] else 0)
 
 
-def letter(row: pd.Series) -> str:
-    return next((sign for end, sign in LETTERS.items() if row[end]), "")
-
-
 def paint(axes: Axes, part: pd.DataFrame, labels: Sequence[str], *, upright: bool) -> None:
     """Draw the cells of an axis, methods upwards, or across where it is ``upright``."""
-    part = part.assign(color=part.apply(color, axis=1), letter=part.apply(letter, axis=1))
+    letters = [next((s for e, s in LETTERS.items() if row[e]), "") for _, row in part.iterrows()]
+    part = part.assign(color=part.apply(color, axis=1), letter=letters)
     methods, values = ([*part[name].drop_duplicates()] for name in ("method", "value"))
     grid = [part.pivot_table(v, "method", "value", "first") for v in ("color", "letter")]
     shown, signs = (table.loc[methods, values].to_numpy() for table in grid)

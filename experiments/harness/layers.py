@@ -5,7 +5,7 @@ A graph of them has a level for every move, and an arc for every pair of candida
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,13 +15,13 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, Rows, _Target, lexicographic
+from seqopt.graph.graph import PEAK, SUM, Graph, Rows, _Target, lexicographic
 from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
 from seqopt.instances.instance import Instance, _Cap
 from seqopt.plan.solve import graph_of
-from seqopt.problem.problem import Aim, Problem, RobustAim
-from seqopt.sequence.schedule import Schedule
+from seqopt.problem.problem import Aim, Problem
+from seqopt.sequence.schedule import Move, Schedule
 
 JOIN = {Aim.SUM: np.add, Aim.PEAK: np.maximum}  # how costs go together
 
@@ -89,41 +89,6 @@ class LayeredCosts(FrozenValue):
         return float(reached.min())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Budget(FrozenValue):
-    """A cap on a total over the build.
-
-    ``name``: what is capped, with its unit; ``single``, ``shared``: use of each choice and of each
-    pair, finite, as of `LayeredCosts`; ``bound``: infinite if there is no cap.
-    """
-
-    name: str
-    single: tuple[Floats, ...]
-    shared: tuple[Floats, ...]
-    bound: float
-
-    @property
-    def amounts(self) -> LayeredCosts:
-        """Uses of the budget as costs of choices; made anew each time, as judges need it."""
-        return LayeredCosts(self.single, self.shared)
-
-    def spent(self, choice: Sequence[int]) -> float:
-        """Return the use of the budget by a choice, in its unit."""
-        return self.amounts.cost(choice)
-
-
-def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
-    """Return the largest of several costs of the same moves, choice by choice and pair by pair.
-
-    The largest cost that a choice meets in any of them is the largest that it meets in this one.
-    """
-
-    def largest(every: Iterable[tuple[Floats, ...]]) -> tuple[Floats, ...]:
-        return tuple(np.max(each, axis=0) for each in zip(*every, strict=True))
-
-    return LayeredCosts(largest(c.single for c in layers), largest(c.shared for c in layers))
-
-
 Blocks = Sequence[Floats]
 """What pairs take, (C_{k-1}, C_k) for every move; infinite where they are not allowed."""
 
@@ -143,45 +108,6 @@ class Compiled(NamedTuple):
         return tuple(self.candidates[list(nodes)].tolist())
 
 
-def compile_costs(
-    name: str,
-    costs: LayeredCosts,
-    aim: Aim,
-    budgets: Sequence[Budget] = (),
-    alone: LayeredCosts | None = None,
-) -> Compiled:
-    """Return the graph of choices of which the sum, or the largest cost, is to be least.
-
-    ``alone``: what a search of one move alone is charged: ranks are those among its candidates.
-    Raises `InfeasibleError`, naming the move, if no choice is allowed; `ProblemError` if a budget
-    is for other moves or candidates.
-    """
-    for budget in budgets:
-        if budget.amounts.sizes != costs.sizes:
-            raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
-    said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
-    capped = [budget for budget in budgets if np.isfinite(budget.bound)]
-    columns = [costs.arcs(aim), *(budget.amounts.arcs() for budget in capped)]
-    caps = [_Cap(b.name, k, float(b.bound)) for k, b in enumerate(capped, start=1)]
-    beside = None
-    if alone is not None:
-        pairs = zip(alone.single, alone.shared, strict=True)
-        beside = [np.broadcast_to(own, both.shape) for own, both in pairs], alone.shared
-    names = ["cost", *(budget.name for budget in capped)]
-    return _compiled(name, (names, (_Target(said, kind, (0,)),), tuple(caps)), columns, beside)
-
-
-def compile_totals(name: str, layers: Sequence[LayeredCosts], aim: RobustAim) -> Compiled:
-    """Return the graph of choices with a sum for every scenario, of which an aim makes one value.
-
-    Raises `InfeasibleError` if no choice is allowed in all scenarios.
-    """
-    count = len(layers)
-    goal = _Target(str(aim), TAIL, tuple(range(count)), aim.most(count))
-    asked = [f"cost {k}" for k in range(count)], (goal,), ()
-    return _compiled(name, asked, [each.arcs() for each in layers])
-
-
 def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
     """Return the choice that is best in the first goal, among these in the second, and so on.
 
@@ -191,11 +117,11 @@ def best_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> tuple[int, ...]:
     kinds = [PEAK if aim is Aim.PEAK else SUM for _, aim in goals]
     targets = tuple(_Target(f"goal {k + 1}", kind, (k,)) for k, kind in enumerate(kinds))
     asked = [goal.name for goal in targets], targets, ()
-    found = _compiled("goals in order", asked, [costs.arcs(aim) for costs, aim in goals])
+    found = compiled("goals in order", asked, [costs.arcs(aim) for costs, aim in goals])
     return found.choice(lexicographic(found.instance.graph).path)
 
 
-def _compiled(
+def compiled(
     name: str,
     asked: tuple[Sequence[str], tuple[_Target, ...], tuple[_Cap, ...]],
     columns: Sequence[Blocks],
@@ -240,54 +166,62 @@ def _arcs(columns: Sequence[Blocks], beside: Sequence[Blocks]) -> tuple[Rows, Ro
     return source.astype(np.int32), target.astype(np.int32), amounts, alone
 
 
+@dataclass(frozen=True, eq=False)
 class Layers:
     """The costs of the candidates of all moves of a problem with open grips.
 
-    ``problem``: or its states, of one scenario. ``moves``: of the schedule; ``steps``: of every
-    step with open grips the moves and the costs of their choices, (C,) or (C, D), infinite where
-    they are not allowed.
+    ``moves``: of the schedule; ``steps``: of every step the moves that are open, -1 before the
+    first, and what their choices cost, (C,) or (C, D), infinite where they are not allowed;
+    ``charged``: the same as a search of one move alone is charged.
     """
 
-    def __init__(self, problem: Problem | States) -> None:
-        graph = problem if isinstance(problem, States) else graph_of(problem, Aim.SUM)
-        assert isinstance(graph.rules, Schedule)
-        space, self.moves = graph.space, graph.rules.moves
-        self.sizes = tuple(len(move.candidates) for move in self.moves)
-        self.steps, self._charged = list[Step](), list[Step]()
-        for level, step in enumerate(graph.rules.steps, start=1):
-            if step.moves:
-                choices = space.candidates(level)
-                costs, within = graph.values(level, choices.states)
-                own = costs[:, 0]
-                charged = graph.candidates.charges(level, choices.states).sum(axis=1)
-                found = [choices.spread(np.where(within, each, np.inf)) for each in (own, charged)]
-                own, charged = (np.where(np.isnan(each), np.inf, each) for each in found)
-                self.steps.append((step.moves, own))
-                self._charged.append((step.moves, charged))
-        given = [graph.values(*each)[0][0, 0] for each in space.without_choice()]
-        self._given = [((-1, 0), np.full((1, self.sizes[0]), cost)) for cost in given]
+    moves: Sequence[Move]
+    steps: Sequence[Step]
+    charged: Sequence[Step]
 
     @cached_property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build counts."""
-        return self.joined(np.add, self.steps + self._given)
+        return self.joined(np.add, self.steps)
 
     @cached_property
     def peaks(self) -> LayeredCosts:
         """The costs of which the largest counts."""
-        return self.joined(np.maximum, self.steps + self._given)
+        return self.joined(np.maximum, self.steps)
 
     @cached_property
     def alone(self) -> LayeredCosts:
         """The sums that a search of one move alone is charged."""
-        return self.joined(np.add, self._charged + self._given)
+        return self.joined(np.add, self.charged)
 
     def joined(self, join: np.ufunc, steps: Sequence[Step]) -> LayeredCosts:
         """Return costs of single choices and of pairs from those of steps."""
-        sizes, found = self.sizes, dict[tuple[int, ...], Floats]()
+        sizes = tuple(len(move.candidates) for move in self.moves)
+        found = dict[tuple[int, ...], Floats]()
         for moves, costs in steps:
             found[moves] = join(found[moves], costs) if moves in found else costs
         single = tuple(found.get((k,), np.zeros(size)) for k, size in enumerate(sizes))
         pairs = enumerate(pairwise((1, *sizes)))
         shared = tuple(found.get((k - 1, k), np.zeros(pair)) for k, pair in pairs)
         return LayeredCosts(single, shared)
+
+
+def cost_layers(problem: Problem | States) -> Layers:
+    """Return the costs of all candidates of a problem, or of its states, of one scenario."""
+    graph = problem if isinstance(problem, States) else graph_of(problem, Aim.SUM)
+    assert isinstance(graph.rules, Schedule)
+    space, moves = graph.space, graph.rules.moves
+    steps, every = list[Step](), list[Step]()
+    for level, step in enumerate(graph.rules.steps, start=1):
+        if step.moves:
+            choices = space.candidates(level)
+            costs, within = graph.values(level, choices.states)
+            charged = graph.candidates.charges(level, choices.states).sum(axis=1)
+            found = [choices.spread(np.where(within, c, np.inf)) for c in (costs[:, 0], charged)]
+            own, charged = (np.where(np.isnan(each), np.inf, each) for each in found)
+            steps.append((step.moves, own))
+            every.append((step.moves, charged))
+    first = len(moves[0].candidates)
+    given = [graph.values(*each)[0][0, 0] for each in space.without_choice()]
+    alike = [((-1, 0), np.full((1, first), cost)) for cost in given]
+    return Layers(moves, steps + alike, every + alike)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from experiments.harness.layers import LayeredCosts, Layers
+from experiments.harness.layers import LayeredCosts, cost_layers
 from seqopt.arrays import Floats
 from seqopt.graph.states import States
 from seqopt.problem.problem import Problem
@@ -20,7 +20,7 @@ def rank_choice(problem: Problem | States, nodes: Sequence[int]) -> pd.DataFrame
 
     ``nodes``: one for every move. Columns: ``step``, and ``rank_in_window`` of the move alone.
     """
-    found = Layers(problem)
+    found = cost_layers(problem)
     choice = [m.candidates.index(node) for m, node in zip(found.moves, nodes, strict=True)]
     ranks = map(rank_of, windows(found.alone, choice), choice)
     return pd.DataFrame({"step": [m.step for m in found.moves], "rank_in_window": [*ranks]})

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt import ArchShape, Network, Robot, Scene, arch_scene, build_network, load_scene
+from seqopt import ArchShape, Network, Scene, arch_scene, build_network, load_scene
 from seqopt.arrays import Ints
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.plan.solve import pose, solve
 from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.common import MASONRY
-from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
@@ -105,30 +104,6 @@ def longer(scene: Scene, times: float) -> Scene:
     )
     robots = [replace(robot, payload=times * robot.payload) for robot in ROBOTS]
     return arch_scene(shape, f"{count} bricks", robots=robots)
-
-
-SPRING = {
-    "along": (0.0, 0.0, 1.0),
-    "across": (1.0, 0.0, 0.0),
-    "translational_stiffness": (3e8, 2e8, 1e8),
-    "rotational_stiffness": (2e6, 1e6, 3e6),
-}
-
-
-def running_bond(columns: int, courses: int) -> Scene:
-    """Return a wall of courses, every second one shifted by half a brick, open between bricks.
-
-    Joints have one stiffness each, whatever their area: three different ones along their axes.
-    """
-    robots = tuple(Robot(name=f"rob{i}", payload=400.0) for i in (1, 2, 3))
-    scene = wall(WallShape(columns=columns, courses=courses)).with_robots(*robots)
-    beds = (joint for joint in scene.joints if abs(joint.along[2]) > 0.5)
-    return replace(
-        scene,
-        joints=tuple(replace(joint, **SPRING) for joint in beds),
-        grounds=tuple(replace(ground, **SPRING) for ground in scene.grounds),
-        provenance="",
-    )
 
 
 def grip_sets(net: Network, bricks: int, count: int) -> Ints:

@@ -8,8 +8,6 @@ optimum. What one arch shows (0.96 % on `arch25` under equations 2 and 3) is one
 The claim holds if under every criterion the cascade's median gap is at most 1 %, its largest over
 all is more than 10 %, and a beam of five stays within 1 % everywhere. These bounds were set after a
 first look at 149 of such arches; they are no law.
-
-Inputs: none. Command: ``python -m experiments heuristic_gaps [--quick]``.
 """
 
 from collections.abc import Iterator

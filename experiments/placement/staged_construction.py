@@ -15,9 +15,6 @@ robot force changes by as much as half; if more than half of the loop's grips ar
 and the staged choice is better by staged responses; and if every step is in equilibrium to 1e-6 N.
 The bounds were set after a first look at the methods. Both are models: mortar that creeps or
 shrinks, and robots that give way, lie between them; joints that would part are taken as bonded.
-
-Inputs: the shipped scene and plan. Command: ``python -m experiments staged_construction
-[--quick]``.
 """
 
 from collections.abc import Callable

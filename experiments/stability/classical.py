@@ -9,8 +9,6 @@ Every row tells how far it may be off, for digits of a print, blocks in place of
 and weights on the middle line (Cocchetti and Rizzi, whose numbers a line of thrust gives with such
 weights). The 0.042 of Heyman's dome is 1.9 % off; our line of thrust is with us.
 No print of the factors of the walls 2 to 6 was at hand: these rows are told, and not judged.
-
-Inputs: none. Command: ``python -m experiments classical [--quick]``.
 """
 
 from collections.abc import Callable

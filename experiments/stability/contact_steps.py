@@ -7,8 +7,6 @@ comes to rest shows such forces, so no step may rest that is proven to fall. The
 forces may exist that nothing brings about. The claim fails if a step rests that is not proven to
 stand, or if none that is proven to stand becomes unstable; steps that were not followed to an end
 count for neither. One arch and two methods: how many steps differ elsewhere is not said.
-
-Inputs: the shipped scene. Command: ``python -m experiments contact_steps [--quick]``.
 """
 
 from collections.abc import Sequence
@@ -113,12 +111,6 @@ def experiment(options: Options) -> Finding:
         found += rows(net, method, METHODS[method](net)[: 10 if options.quick else None])
     table = pd.DataFrame(found)
     print(pd.crosstab([table["method"], table["certificate"]], table["discrete"]).to_string())
-    stands = table["certificate"] == Verdict.STANDS.value
-    rests = table["discrete"] == RESTS
-    ratio = (table["D_max_1e-3mm"] / table["D_max_rigid_1e-3mm"])[rests]
-    spread = f"in the median ({ratio.min():.3g} to {ratio.max():.3g})"
-    print(f"at rest D_max is {ratio.median():.3g} times that of bonded bricks {spread}")
-    print(f"steps that rest and are not proven to stand: {len(table[rests & ~stands])}")
     return Finding(holds(table), tables={"contact_steps": table})
 
 

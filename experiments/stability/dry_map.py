@@ -7,8 +7,6 @@ or let go at any time, and the finished arch is released; every state must be pr
 no robot beyond its payload, neither there nor between springs. The least payload with which a
 schedule exists is found to a tenth, up to four times the weight of the arch. Some must be built by
 three robots and not by two. Not shown: other lines of an arch, other orders of its bricks, reach.
-
-Inputs: generated arches. Command: ``python -m experiments dry_map [--quick]``.
 """
 
 from itertools import product

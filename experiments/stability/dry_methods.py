@@ -9,8 +9,6 @@ The claims of Bruun et al., as they are tested: (1) the twisting steps make the 
 fail first, and the sooner the larger the arch; (2) the cantilever method leans on the mortar: most
 steps with cantilevered bricks stand by bond alone, and it needs more bond than the sequential
 method; (3) the three-robot plan needs less bond than both. One arch, and arches of its shape.
-
-Inputs: the shipped scene and plan. Command: ``python -m experiments dry_methods [--quick]``.
 """
 
 from collections.abc import Iterator

@@ -195,21 +195,13 @@ def faults(table: pd.DataFrame, witnesses: list[str], ratio: float | None) -> li
 
 
 def report(table: pd.DataFrame, witnesses: list[str]) -> None:
-    hidden = ["group", *([] if "lmgc90" in witnesses else ["lmgc90"])]
-    print(table.drop(columns=hidden).to_string(index=False, float_format="%.3g", na_rep=""))
-    print(f"undecided by us: {(table['ours'] == OPEN).sum()} of {len(table)}")
+    print(table.drop(columns="group").to_string(index=False, float_format="%.3g", na_rep=""))
     for witness in witnesses:
-        word = words(table, witness)
-        differs = sorted(case for case, _ in differing(table, witness))
-        print(
-            f"{witness}: asked {(table[witness] != '').sum()}, undecided "
-            f"{(table[witness] == OPEN).sum()}, agree {(word == table['ours']).sum()}, "
-            f"differ {len(differs)}"
-        )
-        for case in differs:
-            print(f"  {case}: {KNOWN.get((case, witness), 'unexplained')}")
-    settled = table[table["rbe"] == OPEN]
-    print(f"rbe undecided, by its constraints: {settled['no_tension'].value_counts().to_dict()}")
+        agree, differs = (words(table, witness) == table["ours"]).sum(), differing(table, witness)
+        asked = (table[witness] != "").sum()
+        print(f"{witness}: asked {asked}, agrees {agree}, differs {len(differs)}")
+        for pair in sorted(differs):
+            print(f"  {pair[0]}: {KNOWN.get(pair, 'unexplained')}")
 
 
 def trials(*, quick: bool) -> list[Trial]:

@@ -7,9 +7,6 @@ three. Variants: which responses are ranked before and after the crown, up to wh
 first set holds, and to what responses are rounded before they are ranked. Which variant comes
 closest was seen after all were tried on the one plan there is: it describes that plan and predicts
 nothing.
-
-Inputs: the shipped scene and plan. Command: ``python -m experiments criteria_variants
-[--quick]``.
 """
 
 import math
@@ -17,25 +14,17 @@ from dataclasses import replace
 from itertools import product
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.ranks import rank_choice
-from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from seqopt import Problem, three_robot_loop
 from seqopt.plan.solve import graph_of, pose
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import Limit
-from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION, published_plan
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
-
-
-def _places(ranks: pd.Series) -> dict[str, object]:
-    return {"first": int((ranks == 1).sum()), "among_three": int((ranks <= 3).sum())}
 
 
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
@@ -72,33 +61,14 @@ def scores(problem: Problem, criteria: list[RankSum]) -> pd.DataFrame:
         ranks = rank_choice(replace(graph, criterion=criterion), nodes)["rank_in_window"]
         before, after, crown, rounded = criterion.name.split(" | ")
         row = {"before_crown": before, "after_crown": after, "after_from_brick": int(crown)}
-        rows.append(row | {"rounded_to": float(rounded), **_places(ranks)})
+        row |= {"rounded_to": float(rounded), "first": int((ranks == 1).sum())}
+        rows.append(row | {"among_three": int((ranks <= 3).sum())})
     return pd.DataFrame(rows)
 
 
 def holds(table: pd.DataFrame, optimizations: int) -> bool:
     most, printed = table["first"].max(), table["first"].iloc[0]
     return bool(printed < most < optimizations)
-
-
-@styled
-def chart(table: pd.DataFrame) -> Figure:
-    figure, axes = subplots(3.8)
-    spread = 0.12 * (table.groupby(["first", "among_three"]).cumcount() % 5)
-    axes.plot(table["first"] + spread, table["among_three"], "o", mfc="none", color=GRAY,
-              label="other variant")  # fmt: skip
-    best = table.sort_values(["first", "among_three"]).iloc[[-1]]
-    (before, after), *_ = best[["before_crown", "after_crown"]].to_numpy()
-    for rows, mark, color, label in (
-        (table.iloc[[0]], "s", VERMILION, "equations 2 and 3, as printed"),
-        (best, "^", BLUE, f"best variant: {before};\nafter the crown {after}"),
-    ):
-        axes.plot(rows["first"], rows["among_three"], mark, color=color, ms=9, label=label)
-    axes.set(xlabel="choices of 22 in which the published node ranks first")
-    axes.set(ylabel="choices in which it is\namong the first three")
-    dress(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right center")
-    return figure
 
 
 def experiment(options: Options) -> Finding:
@@ -115,8 +85,4 @@ def experiment(options: Options) -> Finding:
     return Finding(holds(table, len(problem.schedule.moves)), tables={"criteria_variants": table})
 
 
-CLAIM = Claim(
-    experiment,
-    quick="few variants",
-    pictures={"criteria_variants.png": drawn(chart, "criteria_variants")},
-)
+CLAIM = Claim(experiment, quick="few variants")

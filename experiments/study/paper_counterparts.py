@@ -152,11 +152,6 @@ def statement(item: Item, rows: pd.DataFrame) -> str:
     return f"{text}."
 
 
-def stated(item: Item, table: pd.DataFrame) -> str:
-    """Return `statement` of an item from the rows of all."""
-    return statement(item, table[table["id"] == item.label])
-
-
 def yardstick(rows: pd.DataFrame) -> str:
     """Return median, 90th and 95th percentile of the errors of responses, shares of edges aside."""
     error = rows["error_pct"][rows["quantity"].str.match("F_|M_sup|T_max|D_")]
@@ -188,7 +183,8 @@ def line(item: Item, table: pd.DataFrame) -> str:
     if not item.numbers:
         return f"{head} no: {item.why} | – | – |"
     named = ", ".join(f"`{name}`" for name in ("study.paper_counterparts", item.also) if name)
-    text = stated(item, table).removeprefix(f"{item.number} ")
+    rows = table[table["id"] == item.label]
+    text = statement(item, rows).removeprefix(f"{item.number} ")
     return f"{head} yes | {named} | {text} |"
 
 

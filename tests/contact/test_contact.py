@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import running_bond
 from experiments.stability.parts.blocks import stack
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import (
@@ -29,7 +28,7 @@ from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from seqopt.sequence.methods import METHODS, sequential
 from seqopt.stability._steps import assess_steps
-from tests.builders import block
+from tests.builders import block, running_bond
 
 WALL = running_bond(1, 2)  # two bricks 60 mm high, laid dry: nothing lies between them
 

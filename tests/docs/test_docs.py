@@ -6,14 +6,17 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import product
 
 import pandas as pd
 import pytest
 
+import seqopt
 from experiments.harness.results import RESULTS, stored, two
 from experiments.placement.formulations import CUT, QUESTIONS
 from seqopt._registry import COMMANDS
 from seqopt.graph.formulation import exhibits, formulations
+from seqopt.study import STEP_TABLES, printed_steps
 from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated
@@ -170,6 +173,35 @@ def test_readme_states_what_is_stored(pattern, figures):
     found = re.search(pattern, text)
     assert found, pattern
     assert [*found.groups()] == figures
+
+
+def test_the_page_counts_what_the_printed_tables_have():
+    """Why they are no reference of the chart of speed against regret."""
+    printed = set()
+    for table in map(printed_steps, STEP_TABLES):
+        nodes = table.filter(regex="^rob._node$").to_numpy(float)
+        printed |= {
+            (int(bricks), frozenset(own[own > 0].astype(int).tolist()))
+            for bricks, own in zip(table["bricks"], nodes, strict=True)
+        }
+    engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    loop, choices = seqopt.three_robot_loop(engine.network), set()
+    for step in loop.steps:
+        given = [grip for grip in step.grips if isinstance(grip, int)]
+        for nodes in product(*(loop.moves[move].candidates for move in step.moves)):
+            if step.moves and len({*given, *nodes}) == len(given) + len(nodes):
+                choices.add((step.bricks, frozenset((*given, *nodes))))
+    among = f"Of the {len(choices):,} that the loop chooses among they have"
+    found = [f"{len(printed)} different sets of grips", f"{among} {len(printed & choices)},"]
+    ways = {"90 steps of its best plan": loop, "48 of the best free schedule": seqopt.FreeRules()}
+    for text, moves in ways.items():
+        plan = seqopt.solve(seqopt.pose(engine, moves, seqopt.CRITERIA["worst-ratio"], "minmax"))
+        known = sum((step.bricks, frozenset(step.held)) in printed for step in plan.steps)
+        assert text.startswith(f"{len(plan.steps)} ")
+        found.append(f"of the {text} {known}")
+    page = (ROOT / "docs/tutorials/speed_and_accuracy.md").read_text(encoding="utf-8")
+    page = " ".join(page.split())
+    assert [each for each in found if each not in page] == []
 
 
 def test_readme_in_words_what_is_stored():

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import running_bond
 from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar, find_elastic_limits
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
@@ -20,7 +19,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import sequential
 from seqopt.study import STUDY_BED
-from tests.builders import from_both_sides, largest_difference, six_bricks
+from tests.builders import from_both_sides, largest_difference, running_bond, six_bricks
 
 
 @pytest.fixture(params=ENGINES)

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
-from experiments.harness.scenes import running_bond
 from seqopt.engines.diagnosis import _LEAST_DIAGONAL, UNRESISTED, WELL, Finding, _spectrum, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
@@ -24,7 +23,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import _EVEN, ComplianceEngine, _cancels
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from tests.builders import apart, from_both_sides, hinged, six_bricks, solve_batch
+from tests.builders import apart, from_both_sides, hinged, running_bond, six_bricks, solve_batch
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.scenes import grip_sets, half_circle, running_bond
+from experiments.harness.scenes import grip_sets, half_circle
 from seqopt.engines.interface import Want, grip_columns, read_compliance
 from seqopt.engines.rigid import _growth as growth
 from seqopt.engines.rigid import _refinement as refinement
@@ -27,7 +27,7 @@ from seqopt.engines.rigid.compliance import _LARGE, ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Load
-from tests.builders import apart, hinged, solve_batch
+from tests.builders import apart, hinged, running_bond, solve_batch
 from tests.strategies import arches, both_sided, walls
 
 

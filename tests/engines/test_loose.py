@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.scenes import grip_sets, running_bond
+from experiments.harness.scenes import grip_sets
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
@@ -27,6 +27,7 @@ from tests.builders import (
     from_both_sides,
     hinged,
     on_soft_ground,
+    running_bond,
     six_bricks,
     small_arch,
     solve_batch,

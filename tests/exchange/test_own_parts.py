@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.scenes import running_bond
 from seqopt._registry import ADDED
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError
 from seqopt.exchange import Content, FileBlock, Format, export, import_scene
@@ -25,6 +24,7 @@ from seqopt.exchange._formats import formats, readable, sniffed, writable
 from seqopt.problem import Amount
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES, vertices_of
 from seqopt.sequence.steps import Step, StepKind
+from tests.builders import running_bond
 from tests.documents import DOCUMENTS as OTHERS
 
 GIVEN = Given(density=2000.0)

@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.harness.scenes import running_bond
 from seqopt._files import write_text
 from seqopt.arms._plan_postures import PlanPostures
 from seqopt.errors import SceneError, SceneWarning, StepError
@@ -27,7 +26,7 @@ from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from tests.blocks import box
-from tests.builders import six_bricks
+from tests.builders import running_bond, six_bricks
 from tests.documents import DOCUMENTS, obj
 from tests.strategies import builds
 

@@ -105,10 +105,6 @@ def test_what_is_left_of_the_lead():
         ANEW: (27.9, 19.0),
         "without test 5": (13.8, 12.2),
         "root mean square, least squares, each test left out": (35.9, 27.3),
-        "rigid across, all tests fitted": (14.4, 19.0),
-        "rigid across, each test left out": (15.9, 19.0),
-        "a tenth as stiff across, all tests fitted": (15.5, 19.0),
-        "a tenth as stiff across, each test left out": (23.6, 19.0),
     }
     for what, pair in known.items():
         assert beside.loc[what].to_numpy() == pytest.approx(pair, abs=0.051), what

@@ -161,14 +161,21 @@ CHECKS = {
     ),
     "robust_placement": Check(
         robust_placement.holds,
-        ("robust_placement", "robust_programs"),
+        ("robust_placement",),
         *("unseen_robust", 2.0, {"aim": "worst-peak", "scenarios": 30}),
     ),
-    "speed_accuracy": Check(
-        lambda points: all(speed_accuracy.holds(points).values()),
-        ("regret",),
-        *("regret", 0.5, {"engine": "rigid grips"}),
-    ),
+    **{
+        f"speed_accuracy {column}": Check(
+            lambda *tables: all(speed_accuracy.holds(*tables).values()),
+            ("regret", "digits"),
+            *(column, value, where, spoiled),
+        )
+        for column, value, where, spoiled in (
+            ("regret", 0.5, {"engine": "rigid grips"}, 0),
+            ("same", False, {"schedule": "free", "bricks": 97}, 1),
+            ("six_s", 1e3, {"schedule": "free", "bricks": 97}, 1),
+        )
+    },
     "staged_construction": Check(
         lambda *tables: all(staged_construction.holds(*tables).values()),
         ("staged_construction", "staged_choice"),

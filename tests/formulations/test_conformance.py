@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from formulations import rank_search
 from formulations.flow import OVERLAP_MIP
 from formulations.on_graph import Choice, on_graph
@@ -34,7 +34,7 @@ from seqopt.graph.graph import Graph
 from seqopt.problem.problem import Aim
 from seqopt.study import CRITERIA, EQUATIONS
 from tests.builders import small_arch
-from tests.layered import Costs, answer, of_layers
+from tests.layered import Budget, Costs, answer, of_layers
 from tests.strategies import budgeted, problems
 
 SHOWN = formulations("costs")  # what comparisons have

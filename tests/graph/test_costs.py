@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from formulations._search import exact_best
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
@@ -19,7 +19,7 @@ from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, is_beyond, w
 from seqopt.graph.graph import _sum_bound, distances, lexicographic_bounds, reached
 from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
-from tests.layered import Costs
+from tests.layered import Budget, Costs
 from tests.random_graphs import graphs, simple_paths, values_of
 
 INF = np.inf

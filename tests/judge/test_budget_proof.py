@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from seqopt.engines.interface import Want
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph import Explorer
@@ -39,7 +39,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
-from tests.layered import Costs, answer
+from tests.layered import Budget, Costs, answer
 from tests.plain_rules import PlainBook
 from tests.strategies import budgeted
 

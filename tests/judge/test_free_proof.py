@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from seqopt import judge_instance
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import FormulationKind, find_formulation
@@ -24,7 +24,7 @@ from seqopt.problem.problem import Aim
 from seqopt.sequence.steps import StepKind
 from seqopt.study import EQUATIONS
 from tests.builders import first, small_arch
-from tests.layered import Costs, answer, changed, path_of, told
+from tests.layered import Budget, Costs, answer, changed, path_of, told
 from tests.plain_rules import PlainBook
 from tests.strategies import free_builds, problems
 

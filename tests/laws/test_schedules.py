@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.harness.scenes import running_bond
 from seqopt.arrays import skew
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
@@ -32,6 +31,7 @@ from tests.builders import (
     from_both_ends,
     from_both_sides,
     moved,
+    running_bond,
     small_arch,
 )
 from tests.strategies import arches, both_sided, builds, states, walls

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import integers
 
-from experiments.harness.scenes import running_bond
 from seqopt.network import build
 from seqopt.network.build import build_network
 from seqopt.network.network import PartKind
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import islands
+from tests.builders import running_bond
 from tests.strategies import arches, walls
 
 

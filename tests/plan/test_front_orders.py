@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.engines.registry import make_engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
@@ -24,7 +24,7 @@ from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scenarios import require_alike
 from seqopt.workflow import Robust
 from tests.builders import small_arch
-from tests.layered import Costs, answer
+from tests.layered import Budget, Costs, answer
 from tests.soft_bodies import SoftBodies
 
 INF = np.inf

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import (
@@ -26,7 +26,7 @@ from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.study import EQUATIONS
 from tests.builders import six_bricks
-from tests.layered import Costs, answer
+from tests.layered import Budget, Costs, answer
 
 
 def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path):

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.layers import LayeredCosts, compile_costs, compile_totals, largest_of
+from experiments.harness.layers import LayeredCosts
 from formulations.on_graph import by_weights, cheapest_by, least_total
 from formulations.path_dp import SCENARIO_SEARCH
 from formulations.scenario_program import solve_program
@@ -24,6 +24,7 @@ from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.responses import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch
+from tests.layered import compile_costs, compile_totals, largest_of
 
 AIMS = (WORST_PEAK, WORST_TOTAL, cvar(0.5), cvar(0.99))
 every = pytest.mark.parametrize("aim", AIMS, ids=str)

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.layers import best_in_order
-from experiments.harness.scenes import running_bond
 from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
@@ -22,7 +21,7 @@ from seqopt.responses.scales import NEVER, SceneFacts, crown
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION
-from tests.builders import anywhere, far_reaching, rescaled, six_bricks, small_arch
+from tests.builders import anywhere, far_reaching, rescaled, running_bond, six_bricks, small_arch
 from tests.strategies import arches, problems
 
 NAMES = ("F_largest", "M_sup")

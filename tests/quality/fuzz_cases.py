@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.harness.scenes import running_bond
 from seqopt.graph.formulation import formulation_names
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -19,6 +18,7 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step
+from tests.builders import running_bond
 
 COMMANDS = ("scene", "analyze", "optimize", "assess", "compare")
 QUICK = ("compliance", "frame", "auto")  # hundreds of grip sets in a moment

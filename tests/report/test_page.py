@@ -17,7 +17,6 @@ import pytest
 from hypothesis import given, settings
 
 import seqopt
-from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
 from seqopt._files import Page, csv_text
 from seqopt.engines.interface import Want
@@ -34,6 +33,7 @@ from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import sequential
 from tests import strategies
 from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
+from tests.builders import running_bond
 
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
 SMALL = "chain:bricks=7"

@@ -11,7 +11,6 @@ import pytest
 from scipy.stats import rankdata
 
 import seqopt
-from experiments.harness.scenes import running_bond
 from seqopt._files import csv_text
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
@@ -36,7 +35,7 @@ from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study import EQUATIONS
 from seqopt.workflow import optimize
-from tests.builders import six_bricks
+from tests.builders import running_bond, six_bricks
 
 
 @pytest.fixture(scope="module")

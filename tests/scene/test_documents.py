@@ -11,7 +11,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from experiments.harness.scenes import running_bond
 from seqopt._cli.main import main
 from seqopt.contact.faces import bare_assembly
 from seqopt.errors import FileError, SceneError, SceneWarning
@@ -19,7 +18,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import _find_warnings, _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes
-from tests.builders import six_bricks
+from tests.builders import running_bond, six_bricks
 from tests.strategies import arches, flat_arches, scenes_with_all, walls
 
 TEXT = dump_scene(six_bricks())

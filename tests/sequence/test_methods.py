@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -25,7 +24,7 @@ from seqopt.sequence.methods import (
 from seqopt.sequence.schedule import OpenGrip, OpenStep, holds, islands
 from seqopt.sequence.steps import StepKind, check_sequence
 from seqopt.study import published_plan
-from tests.builders import anywhere, branch, from_both_ends, small_arch
+from tests.builders import anywhere, branch, from_both_ends, running_bond, small_arch
 
 
 def test_where_all_bricks_lie_along_the_methods_are_one():

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.scenes import running_bond
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import PartialAssemblies, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
@@ -35,7 +34,7 @@ from seqopt.stability._steps import (
 from seqopt.stability.assessment import MARGINS, Verdict, verdict
 from seqopt.stability.limit_analysis import Answer, Claim
 from tests.blocks import with_shapes
-from tests.builders import branch, from_both_ends, six_bricks
+from tests.builders import branch, from_both_ends, running_bond, six_bricks
 from tests.limit_scenes import chain as leaning_chain
 from tests.limit_scenes import without_joint
 from tests.strategies import walls

@@ -144,10 +144,9 @@ def _transmitted(points: Floats, slope: Floats, at: Floats) -> Floats:
     return out
 
 
-def planar_parts(chain: Chain, shear: float = 1.0) -> Parts:
-    """Return the energies of a chain; ``shear`` is the compliance across a joint over along it."""
+def planar_parts(chain: Chain) -> Parts:
+    """Return the energies of a chain whose joints are as stiff across as along."""
     points, slope, loads = chain
-    share = np.array([1.0, shear])
     free = _transmitted(points, slope, points[-1])
     load = np.zeros((len(points), 3))
     for x in loads:
@@ -155,14 +154,14 @@ def planar_parts(chain: Chain, shear: float = 1.0) -> Parts:
         load += acts * _transmitted(points, slope, np.array([x, 0.0]))[:, :, 1] / len(loads)
     return Parts(
         (
-            np.einsum("jki,k,jkl->il", free[:, :2], share, free[:, :2]),
+            np.einsum("jki,jkl->il", free[:, :2], free[:, :2]),
             np.einsum("ji,jl->il", free[:, 2], free[:, 2]),
         ),
         (
-            np.einsum("jki,k,jk->i", free[:, :2], share, load[:, :2]),
+            np.einsum("jki,jk->i", free[:, :2], load[:, :2]),
             np.einsum("ji,j->i", free[:, 2], load[:, 2]),
         ),
-        (float((load[:, :2] ** 2 @ share).sum()), float((load[:, 2] ** 2).sum())),
+        (float((load[:, :2] ** 2).sum()), float((load[:, 2] ** 2).sum())),
     )
 
 

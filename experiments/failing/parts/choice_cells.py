@@ -24,7 +24,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from experiments.harness.layers import Budget, LayeredCosts
+from experiments.harness.layers import LayeredCosts
 from experiments.harness.scenes import half_circle
 from formulations import solvers
 from seqopt.arrays import Floats
@@ -37,7 +37,7 @@ from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import three_robot_loop
 from seqopt.study import EQUATIONS, RESOLUTION
-from tests.layered import Costs, of_layers
+from tests.layered import Budget, Costs, of_layers
 from tests.layered import answer as claimed_answer
 
 COARSE = replace(
@@ -169,13 +169,6 @@ def opposed(size: Size, rng: Rng, total: float) -> Costs:
     return replace(problem, budgets=budgets)
 
 
-def negative(size: Size, rng: Rng) -> Costs:
-    """Return a problem with costs below zero, which its graph refuses."""
-    problem = whole(size.sizes, rng, least=-9)
-    problem.compiled()
-    return problem
-
-
 def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Costs:
     """Return the problem of the three-robot loop on a small arch."""
     engine = ComplianceEngine(half_circle(size.bricks))
@@ -213,7 +206,7 @@ CASES: dict[str, Case] = {
     "budgets not met by mixtures": lambda size, rng: opposed(size, rng, 0.9),
     "budget amount NaN": lambda size, rng: capped(size, rng, np.nan, 1.0),
 }
-MALFORMED = {"negative costs", "one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
+MALFORMED = {"one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 CLOSE = 1e-6  # relative: values this close are equal
 SCALES = tuple(10.0**power for power in range(-12, 13, 3))

@@ -33,9 +33,7 @@ from seqopt.stability.failure_map import failure_map
 DIRECTIONS = 16  # in which friction is bounded
 ALL_ROUND = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 ALL_ROUND /= np.linalg.norm(ALL_ROUND, axis=1)[:, None]
-WITHIN = (
-    0.88  # radius of a ball in which 26 planes at 1 touch it: none of their corners is beyond 1
-)
+WITHIN = 0.88  # radius of a ball: 26 planes that touch it have no corner beyond 1
 LEAN = np.arange(8) * np.pi / 4  # sides to which a structure is tilted
 SLACK = 1e-9  # of forces over the heaviest brick's weight
 SOLVED, INFEASIBLE = 0, 2  # of scipy's statuses

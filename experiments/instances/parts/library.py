@@ -146,7 +146,6 @@ def known() -> dict[str, dict]:
 
 
 def run(names: list[str]) -> None:
-    HOME.mkdir(exist_ok=True)
     for name in names or MADE:
         with TemporaryDirectory() as folder:
             content = made(name, Path(folder))

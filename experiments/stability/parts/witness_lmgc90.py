@@ -17,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -40,27 +41,21 @@ def python_with_lmgc90(python: str) -> str | None:
     return str(Path(found).absolute())
 
 
-def asked(python: str, program: str, scene: dict[str, Any], limit: float) -> dict[str, Any] | None:
-    """Return what a program says of a scene, in another Python; None if it breaks off."""
-    with tempfile.TemporaryDirectory() as folder:
-        shown, said = Path(folder) / "scene.json", Path(folder) / "result.json"
-        shown.write_text(json.dumps(scene), encoding="utf-8")
-        command = [python, program, str(shown), str(said)]
-        try:
-            subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=limit)
-        except subprocess.TimeoutExpired:
-            return None
-        return dict(json.loads(said.read_text("utf-8"))) if said.exists() else None
-
-
 def moved_by(python: str, scene: Any, friction: float) -> str:
     """Return the verdict of LMGC90, in another Python; undecided if it breaks off."""
     blocks = [
         {"vertices": x.vertex.tolist(), "faces": x.faces, "support": i in scene.supports}
         for i, x in enumerate(scene.solids)
     ]
-    result = asked(python, __file__, {"blocks": blocks, "friction": friction}, LIMIT)
-    return "undecided" if result is None else str(result["verdict"])
+    with tempfile.TemporaryDirectory() as folder:
+        shown, said = Path(folder) / "scene.json", Path(folder) / "result.json"
+        shown.write_text(json.dumps({"blocks": blocks, "friction": friction}), encoding="utf-8")
+        command = [python, __file__, str(shown), str(said)]
+        with suppress(subprocess.TimeoutExpired):
+            subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=LIMIT)
+        if not said.exists():
+            return "undecided"
+        return str(json.loads(said.read_text("utf-8"))["verdict"])
 
 
 def simulation(scene: dict[str, Any], size: float) -> Any:

@@ -21,7 +21,6 @@ from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
 from seqopt.plan.solve import pose
 from seqopt.problem.problem import Problem
 from seqopt.report.comparison import Comparison, compare
@@ -72,14 +71,9 @@ def ours() -> Ours:
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
 
-def arch_corners(scene: Scene) -> Floats:
-    """Return the corners of all bricks, (8 B, 3), m."""
-    return box_corners(scene.bricks).reshape(-1, 3)
-
-
 def geometry(own: Ours) -> Rows:
     """Compare the size of the arch (figure 2)."""
-    corners = arch_corners(own.scene)
+    corners = box_corners(own.scene.bricks).reshape(-1, 3)
     first, last = (np.array(ground.position) for ground in own.scene.grounds)
     along = (last - first) * [1, 1, 0]
     span = float(np.ptp(corners @ along / np.linalg.norm(along)))
@@ -139,15 +133,10 @@ def nodes_compared(own: Ours) -> Rows:
         yield Row("inner nodes that no robot holds", at, study[step.bricks], count)
 
 
-def _discrete(network: Network) -> DiscreteEngine:
-    """Return discrete elements as printed, with a robot that holds a node."""
-    return DiscreteEngine(network, bed=STUDY_BED)
-
-
 def discrete_elements(own: Ours) -> Rows:
-    """Compare mean errors against discrete elements (table 3)."""
+    """Compare mean errors against discrete elements, where a robot holds a node (table 3)."""
     study = printed("de_validation").set_index("bricks")["error_percent"]
-    discrete = _discrete(own.engine.network)
+    discrete = DiscreteEngine(own.engine.network, bed=STUDY_BED)
     for step in arches(own):
         mean = error(moved(own.engine, step), moved(discrete, step))
         yield Row("mean error [%]", f"{step.bricks} bricks", study[step.bricks], mean)

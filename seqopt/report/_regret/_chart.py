@@ -120,7 +120,9 @@ def _regrets(axes: Axes, table: RegretTable) -> None:
     _draw_curves(axes, table)
     _scales(axes, table, seen)
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
-    for _, row in kept.assign(same=kept["regret"].round(4)).drop_duplicates("same").iterrows():
+    front = kept[kept["regret"] <= kept["regret"].cummin()]
+    near = (2 * np.log10(front["regret"].map(_height))).round()  # whose words would overlap
+    for _, row in front[~near.duplicated()].iterrows():
         engine = f"{row['engine']}: " * (row["engine"] != table.reference)
         words = textwrap.fill(engine + _words(row), LINE)
         at = float(row["seconds"]), _height(float(row["regret"]))
