@@ -204,8 +204,7 @@ class States(Shown):
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         stands = None
         if self.standing is not None:
-            sets = {name: getattr(self.stability, name) for name in COUNTED}
-            stands = {**self.standing.described(), **sets}
+            stands = {**self.standing.described(), **self.verdicts}
         return {
             "aims": [*self.names][: max(1, len(self.aims))],
             **judged_by(self.goals or (SUM,), self.criterion),
@@ -554,6 +553,13 @@ class States(Shown):
         """Cached verdicts and margins of grip sets."""
         mortar = self.standing or Standing()
         return StandingSets(self.network, mortar, self._payloads, self.demands)
+
+    @property
+    def verdicts(self) -> dict[str, int]:
+        """How many grip sets were asked whether they stand, in all scenarios, and what it took."""
+        asks = self.standing is not None or any(goal.margins for goal in self.goals)
+        every = [one.stability for one in self.each or (self,)] if asks else []
+        return {name: sum(getattr(sets, name) for sets in every) for name in COUNTED}
 
     def share_proofs(self, other: States) -> None:
         """Share proofs of stability with a problem of the same scenes."""

@@ -92,7 +92,7 @@ class FrontProblem:
                 less = "give an order, or rules with fewer states"
                 raise ProblemError(f"pareto: the states do not fit the memory; {less}")
 
-        found = explore(self._problem, tell=tell)
+        found = explore(self._problem, tell=tell, exact=True)
         if not found.whole:
             raise confirmed(self._problem, "the search")
         found.refine()

@@ -20,6 +20,7 @@ from seqopt.engines.registry import DEFAULT, provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Run, Solution
 from seqopt.graph.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
+from seqopt.plan._spent import Spent, spent_on
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Problem
@@ -431,29 +432,10 @@ class Plan(ShownBuild):
         }
 
     @property
-    def spent(self) -> dict[str, dict[str, Any]]:
-        """What was computed to choose and to prove, beside what had to be.
-
-        ``models``: ``searched``, ``six_digits`` of them, ``proof`` (None without one), and
-        ``states`` in that; ``responses``: ``asked`` by goals, criterion and limits, and
-        ``computed``, beside grip forces, which come with all; ``verdicts``: ``asked`` of grip sets,
-        and the linear ``programs`` that these took.
-        """
-        graph, proof = self.states, self.certificate
-        stands = None if graph.standing is None else graph.stability
-        return {
-            "models": {
-                "searched": self.models,
-                "six_digits": graph.six_digit_models,
-                "proof": None if proof is None or self.gap is None else proof.models or self.models,
-                "states": 0 if proof is None else proof.states,
-            },
-            "responses": {"asked": sorted(graph.asked), "computed": sorted(graph.sets.names)},
-            "verdicts": {
-                "asked": 0 if stands is None else stands.looked_at,
-                "programs": 0 if stands is None else stands.programs,
-            },
-        }
+    def spent(self) -> Spent:
+        """What was computed to choose and to prove, beside what had to be, as of `spent_on`."""
+        proof = None if self.gap is None else self.certificate
+        return spent_on(self.states, self.steps, self.models, proof)
 
     def _answer(self) -> dict[str, object]:
         """Return the entries of a summary about values and what is proven of them."""
