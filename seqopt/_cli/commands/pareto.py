@@ -22,7 +22,7 @@ from seqopt.plan.solve import graph_of
 from seqopt.questions import pareto
 from seqopt.report._folders import figure_notes, front_counts, front_files, front_spent, numbered
 from seqopt.report.comparison import shown_table
-from seqopt.responses.table import Departure, LinearRange, analyze, builds_in_words
+from seqopt.responses.table import Departure, LinearRange, analyze_builds, builds_in_words
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability.failure_map import BuildVerdicts, find_prover
@@ -123,7 +123,7 @@ def _responses(front: Front) -> tuple[dict[str, pd.DataFrame], Departures]:
     """Return the responses of the steps of every plan, and where they leave the linear range."""
     each, left = dict[str, pd.DataFrame](), dict[str, Sequence[Departure]]()
     for own, builds in _by_engine(front).items():
-        found = {name: analyze(own, steps) for name, steps in builds.items()}
+        found = analyze_builds(own, builds)
         each |= found
         left |= LinearRange(own).of_builds(found)
     names = [f"point {number}" for number in range(1, len(front.steps) + 1)]
