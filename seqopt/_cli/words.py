@@ -52,7 +52,6 @@ FLAGS = {
     "bounds": "bound",
     "budgets": "budget",
     "count": "scenarios",
-    "criterion": "criteria",
     "limits": "limit",
     "measure": "robust",
     "options": "option",

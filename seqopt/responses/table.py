@@ -94,9 +94,7 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     return _table_of(_analyzed(engine, steps))
 
 
-def analyze_builds(
-    engine: Engine, builds: Mapping[str, Sequence[Step]]
-) -> dict[str, pd.DataFrame]:
+def analyze_builds(engine: Engine, builds: Mapping[str, Sequence[Step]]) -> dict[str, pd.DataFrame]:
     """Return the tables of `analyze` of builds by name; states that they share are solved once."""
     states = _distinct(builds.values())
     known = dict(zip(states, _each_fields(engine, states.values()), strict=True))

@@ -68,7 +68,7 @@ def run(
     $ seqopt optimize arch25 --out best
     $ seqopt optimize arch25 --schedule free --aim minmax,steps --out free
     $ seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
-    $ seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
+    $ seqopt optimize my.json --criterion worst-ratio --limit payload --out mine
     """
     output = Output(out, asked.words.get("scene"), asked.words.get("schedule"))
     output.require(*ALWAYS)
