@@ -49,14 +49,13 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
-from seqopt.stability.standing import Standing, StandingSets
+from seqopt.stability.standing import Standing, StandingSets, counted
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
     from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
 _Valued = Callable[[Ints], tuple[Floats, Bools]]
-COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
 @dataclass(frozen=True, repr=False)
@@ -204,7 +203,8 @@ class States(Shown):
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         stands = None
         if self.standing is not None:
-            stands = {**self.standing.described(), **self.verdicts}
+            sets = counted(one.stability for one in self.each or (self,))
+            stands = {**self.standing.described(), **sets}
         return {
             "aims": [*self.names][: max(1, len(self.aims))],
             **judged_by(self.goals or (SUM,), self.criterion),
@@ -553,13 +553,6 @@ class States(Shown):
         """Cached verdicts and margins of grip sets."""
         mortar = self.standing or Standing()
         return StandingSets(self.network, mortar, self._payloads, self.demands)
-
-    @property
-    def verdicts(self) -> dict[str, int]:
-        """How many grip sets were asked whether they stand, in all scenarios, and what it took."""
-        asks = self.standing is not None or any(goal.margins for goal in self.goals)
-        every = [one.stability for one in self.each or (self,)] if asks else []
-        return {name: sum(getattr(sets, name) for sets in every) for name in COUNTED}
 
     def share_proofs(self, other: States) -> None:
         """Share proofs of stability with a problem of the same scenes."""

@@ -7,7 +7,9 @@ from typing import Any
 
 from seqopt.graph.states import States
 from seqopt.judge.certificate import Certificate
+from seqopt.responses._grip_sets import GripSets
 from seqopt.sequence.steps import Step
+from seqopt.stability.standing import counted
 
 Spent = dict[str, dict[str, Any]]
 
@@ -40,9 +42,11 @@ def spent_on(
         "answered": sum(getattr(engine, "answered", 0) for engine in engines),
         "corrected": sum(getattr(engine, "corrected", 0) for engine in engines),
     }
-    known = [sets for sets in graph.answers.values() if sets.solved]
+    known = [each for each in graph.answers.values() if isinstance(each, GripSets) and each.solved]
     computed = {name for sets in known for name in sets.names}
     values = sum(sets.solved * len(sets.names) for sets in known)
     responses = {"asked": sorted(graph.asked), "computed": sorted(computed), "values": values}
-    verdicts = {"asked": graph.verdicts["looked_at"], "programs": graph.verdicts["programs"]}
+    asks = graph.standing is not None or any(goal.margins for goal in graph.goals)
+    known_to_stand = counted(each.stability for each in every if asks)
+    verdicts = {"asked": known_to_stand["looked_at"], "programs": known_to_stand["programs"]}
     return {"models": models, "responses": responses, "verdicts": verdicts}

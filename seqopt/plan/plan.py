@@ -20,7 +20,6 @@ from seqopt.engines.registry import DEFAULT, provenance
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Run, Solution
 from seqopt.graph.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
-from seqopt.plan._spent import Spent, spent_on
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Problem
@@ -49,6 +48,7 @@ from seqopt.stability.standing import Standing
 from seqopt.work.progress import Tell
 
 PROOFS = Later("seqopt.judge._schedules")  # 20 ms
+SPENT = Later("seqopt.plan._spent")  # where it is asked for
 STEPS = Later("seqopt.stability._steps")  # where it is asked whether steps stand
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -432,10 +432,13 @@ class Plan(ShownBuild):
         }
 
     @property
-    def spent(self) -> Spent:
-        """What was computed to choose and to prove, beside what had to be, as of `spent_on`."""
+    def spent(self) -> dict[str, dict[str, Any]]:
+        """What was computed to choose and prove, beside what had to be: `seqopt.plan._spent`."""
         proof = None if self.gap is None else self.certificate
-        return spent_on(self.states, self.steps, self.models, proof)
+        spent: dict[str, dict[str, Any]] = SPENT.spent_on(
+            self.states, self.steps, self.models, proof
+        )
+        return spent
 
     def _answer(self) -> dict[str, object]:
         """Return the entries of a summary about values and what is proven of them."""
