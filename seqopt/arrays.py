@@ -191,6 +191,11 @@ class KnownRows:
         at = np.searchsorted(known, codes).clip(max=len(known) - 1)
         return np.where(known[at] == codes, values[at, 0], np.nan)
 
+    def shared(self, other: KnownRows) -> int:
+        """Return how many rows both have."""
+        pairs = ((codes, other._known.get(key)) for key, (codes, _) in self._known.items())
+        return sum(len(np.intersect1d(codes, found[0])) for codes, found in pairs if found)
+
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
         """Return the rows of codes; those not cached are computed as one batch.
 

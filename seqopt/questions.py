@@ -221,14 +221,14 @@ def assess(  # noqa: PLR0913  # every question is a word of its own
     scene, steps : optional
         As of `find_build`; with a scene or its network also steps that do not follow each other.
     mortar : Mortar or str, optional
-        What is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), or
-        bond=STRENGTH (Pa) (default: epoxy; of the command dry, then epoxy, which alone decides the
-        exit status).
+        What is in the joints: the epoxy of Bruun et al. (3 MPa in tension, 2 MPa in shear), dry
+        (nothing), or bond=STRENGTH (Pa) (default: epoxy; of the command dry, then epoxy, which
+        alone decides the exit status).
     margins : str or collection of str, optional
         Margins beside the verdicts, or all, with commas between them; each takes several times as
         long.
     friction : float, optional
-        Coefficient of friction, in place of the mortar's own.
+        Coefficient of friction of all joints (default: 0.466, of 25°, with every mortar).
     workers : int, optional
         Processes to share the steps among (default: {default}).
     robots, cache, progress : optional
@@ -256,6 +256,7 @@ def pareto(  # noqa: PLR0913  # every question is a word of its own
     schedule: Schedule | Part | Path | str = FREE,
     aim: str = FOUR,
     *,
+    criterion: Criterion | str | None = None,
     rounding: Mapping[str, float] | Sequence[str] = (),
     engine: str = DEFAULT,
     limits: Sequence[Limit | Filter | str] | str = (),
@@ -277,6 +278,9 @@ def pareto(  # noqa: PLR0913  # every question is a word of its own
     aim : str, optional
         What is to be small: responses and, of the free schedule, steps or regrips (default:
         {default}).
+    criterion : Criterion or str, optional
+        What a step costs, for the aim minmax: worst-ratio (over the least worst of fixed methods;
+        default), another one that does not rank, or its name.
     rounding : mapping of str to float or sequence of str, optional
         Round a number up to multiples of a step (SI units).
     engine, limits, stands, order, mortar, robots, rules, time_limit, cache, progress : optional
@@ -294,7 +298,7 @@ def pareto(  # noqa: PLR0913  # every question is a word of its own
     """
     asked = locals()  # all of its parameters
     clock = Clock(time_limit)
-    more = dict.fromkeys(("criterion", "formulation", "robust", "candidates"))
+    more = dict.fromkeys(("formulation", "robust", "candidates"))
     with clock.needed("posing the problem"):
         own = {"budgets": (), "search": Search(cache=cache)}
         problem = pose_build({**asked, **more, **own})

@@ -127,8 +127,10 @@ def sweep(
             progress(Stage("problems", sum(name in rows for name in names) / len(names)))
 
     solve = partial(_row, plan, tuple(mortars))
-    with hire(executor, workers) as crew, closing(map_ordered(solve, todo, crew, done)) as found:
-        deque(found, maxlen=0)
+    with hire(executor, workers) as crew:
+        begun = todo if crew is None else todo[::-1]  # ranges go up: the largest is not left alone
+        with closing(map_ordered(solve, begun, crew, done)) as found:
+            deque(found, maxlen=0)
     return _table(rows, names)
 
 

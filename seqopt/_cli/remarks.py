@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
@@ -64,6 +65,31 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
     said = f"{total:.6g} s are waits for mortar, in {steps}"
     yield said if len(waits) else "no step waits for mortar"
     yield "every state is proven to stand with the bond that its joints have when it begins"
+
+
+def spent_said(
+    spent: Mapping[str, Mapping[str, Any]], showing: Mapping[str, int] | None = None
+) -> str:
+    """Say in a line what a run computed beside what had to be, as of `seqopt.plan._spent`."""
+    models, parts = spent["models"], list[str]()
+    if "searched" in models:
+        digits = f"{models['six_digits']:,} in six digits, {models['again']:,} again in full"
+        parts.append(f"{models['searched']:,} models searched ({digits})")
+        parts.append("no proof" if models["proof"] is None else f"{models['proof']:,} prove it")
+    parts.append(f"at least {models['needed']:,} had to be")
+    if models["answered"] >= models.get("searched", 0):  # engines of other orders are not counted
+        parts.append(f"{models['answered']:,} solved in all, {models['corrected']:,} corrected")
+    if "responses" in spent:
+        names, asked = (spent["responses"][name] for name in ("computed", "asked"))
+        more = ", ".join(sorted({*names} - {*asked}))
+        parts.append(f"{spent['responses']['values']:,} responses ({', '.join(names) or 'forces'}")
+        parts[-1] += f"; nobody asked for {more})" if more else ", all asked for)"
+    if asked := spent.get("verdicts", {}).get("asked"):
+        parts.append(f"{asked:,} verdicts by {spent['verdicts']['programs']:,} programs")
+    if showing is not None:
+        shown = f"{showing['verdicts']:,} verdicts shown, {showing['proven']:,} proven for them"
+        parts += [shown, f"{showing['pictures']:,} pictures"]
+    return f"spent: {'; '.join(parts)}"
 
 
 def refused(prover: BuildProver) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ QUESTIONS = {
     "How are responses computed?": "engine mortar tolerance cache",
     "What does the file not say?": "unit up density supports",
     "Which joints are made?": "stiffness gap accept_overlaps",
-    "What is written and printed?": "out name below figures stability quiet json",
+    "What is written and printed?": "out name below figures stability details quiet json",
 }
 """Options by the question that they answer, in the order in which help asks them."""
 FLAGS = {
@@ -52,7 +52,6 @@ FLAGS = {
     "bounds": "bound",
     "budgets": "budget",
     "count": "scenarios",
-    "criterion": "criteria",
     "limits": "limit",
     "measure": "robust",
     "options": "option",

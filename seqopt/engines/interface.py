@@ -435,7 +435,13 @@ def _merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
 
 
 class NamedEngine:
-    """Base of engines, with a representation that names engine and structure."""
+    """Base of engines, with a representation that names engine and structure.
+
+    ``answered``: how many grip sets it was asked for in all, ``corrected``: of them those whose
+    first answer had too few digits.
+    """
+
+    answered = corrected = 0
 
     def __init__(self, network: Network | Scene) -> None:
         self.network = network_of(network)  # whose nodes and edges the fields follow
@@ -458,6 +464,7 @@ class SerialEngine(NamedEngine, ABC):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
+        self.answered += len(columns)
         compliance = read_compliance(self.network, columns, grips, moved)
         answers = [no_sets(self.network, bricks, columns.shape[1])]
         for i, held in enumerate(columns):

@@ -95,6 +95,7 @@ class AutoEngine(NamedEngine):
             found = self._discrete.solve(bricks, sets, asked, far)
             fields = _merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
         levels = zip(REASONS, (~beyond, beyond), strict=True)
+        self.answered, self.corrected = self.answered + len(beyond), self.rigid.corrected
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)
 

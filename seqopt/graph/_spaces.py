@@ -442,17 +442,21 @@ def explore(
     ceiling: float = np.inf,
     width: int | None = None,
     tell: Callable[[Explorer], object] = lambda _: None,
+    *,
+    exact: bool = False,
 ) -> Explorer:
     """Return the visited states of a problem below a ceiling, its stability requirement included.
 
     ``ceiling``: upper bound of the first goal, if it is a peak; ``width``: how many new states of a
     brick count are kept, and without regrips; ``tell``: called after every level; may raise to end
-    the search. Nothing is visited where a state that every plan passes is infeasible.
+    the search; ``exact``: as of `Explorer`. Nothing is visited where a state that every plan passes
+    is infeasible.
     """
     asked = bool(problem.demands) or any(goal.margins for goal in problem.goals)
     few = width is not None
     space = build_space(problem, regrips=not few, every=not few, standing=asked)
     found = Explorer(space, width, tell)
+    found.exact = exact
     if barred(problem) is None:
         found.rise(ceiling)
     return found

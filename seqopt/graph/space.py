@@ -254,7 +254,11 @@ class Explorer:
         How often the threshold rose.
     nbytes : int
         How much memory states and moves take.
+    exact : bool
+        Whether states are valued exactly at once, for searches that need that of nearly all.
     """
+
+    exact = False
 
     def __init__(
         self,
@@ -415,7 +419,8 @@ class Explorer:
         """Return the states that are to be visited, all new ones being valued."""
 
         def valued(states: Ints) -> tuple[Floats, Bools, float]:
-            return *self.space.values(key, states, rough=True, most=self._most), self._most
+            most, rough = self._most, not self.exact
+            return *self.space.values(key, states, rough=rough, most=most), most
 
         while True:
             few = part.spent + part.to_go <= self.most if self.counts else True

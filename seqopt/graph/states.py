@@ -49,14 +49,13 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
-from seqopt.stability.standing import Standing, StandingSets
+from seqopt.stability.standing import Standing, StandingSets, counted
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
     from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
 _Valued = Callable[[Ints], tuple[Floats, Bools]]
-COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
 @dataclass(frozen=True, repr=False)
@@ -204,7 +203,7 @@ class States(Shown):
         """Return the settings of the problem for a summary; ``limits``: bounds by name."""
         stands = None
         if self.standing is not None:
-            sets = {name: getattr(self.stability, name) for name in COUNTED}
+            sets = counted(one.stability for one in self.each or (self,))
             stands = {**self.standing.described(), **sets}
         return {
             "aims": [*self.names][: max(1, len(self.aims))],

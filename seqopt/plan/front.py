@@ -19,14 +19,14 @@ from seqopt.graph.formulation import Formulation, Solution, as_formulation
 from seqopt.graph.graph import Graph, distances, fewest_moves, keep_best, reached
 from seqopt.graph.space import Explorer, Space, Visited
 from seqopt.graph.states import States
-from seqopt.judge._schedules import ordered, plan_values
+from seqopt.judge._schedules import _recomputed, ordered
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._answers import called, readable, with_numbers
 from seqopt.plan._infeasible import confirmed
 from seqopt.plan.solve import best_within, graph_of, leaves
 from seqopt.problem.amounts import REGRIPS, STEPS
 from seqopt.problem.problem import Problem
-from seqopt.responses._grip_sets import Moved, most_moved
+from seqopt.responses._grip_sets import Moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Step, StepKind
@@ -92,7 +92,7 @@ class FrontProblem:
                 less = "give an order, or rules with fewer states"
                 raise ProblemError(f"pareto: the states do not fit the memory; {less}")
 
-        found = explore(self._problem, tell=tell)
+        found = explore(self._problem, tell=tell, exact=True)
         if not found.whole:
             raise confirmed(self._problem, "the search")
         found.refine()
@@ -134,8 +134,13 @@ class FrontProblem:
 
     def values(self, plan: Solution) -> Floats:
         """Return the goals' values (k,) of a plan, from its responses, rounded; SI units."""
-        found = plan_values(self._of_plan(plan), self.steps(plan), plan.objective)
-        return _rounded_up(np.array(found), self._round)
+        return self._judged(plan)[0]
+
+    def _judged(self, plan: Solution) -> tuple[Floats, Moved]:
+        """Return these values, and the largest displacement, over the linear range."""
+        problem, steps = self._of_plan(plan), self.steps(plan)
+        found, moved = _recomputed(problem, steps, plan.objective, ())
+        return _rounded_up(np.array(found), self._round), moved
 
     def engine(self, plan: Solution) -> Engine:
         """Return the engine of a plan, for the scene in its build order."""
@@ -216,10 +221,7 @@ def find_front(
             posed = FrontProblem(states, rounding)
         left = max(0.0, end - time.perf_counter())
         front = _front_of(posed, formulation, left, progress, watch)
-
-        pairs = zip(front.engines, front.steps, strict=True)
-        moved = tuple(most_moved(engine, steps) for engine, steps in pairs)
-        return replace(front, moved=moved, problem=problem)
+        return replace(front, problem=problem)
 
     def farthest(front: Front) -> Moved | None:  # all of its plans keep the range, or none can
         return max(front.moved, key=lambda each: each.share, default=None)
@@ -242,8 +244,8 @@ def _front_of(
     points = np.array([plan.objective for plan in chosen])
     with readable(name):
         plans = tuple(map(problem.steps, chosen))
-    for i, (point, plan) in enumerate(zip(points, chosen, strict=True)):
-        values = problem.values(plan)
+    judged = [problem._judged(plan) for plan in chosen]
+    for i, (point, (values, _)) in enumerate(zip(points, judged, strict=True)):
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
             raise SolverError(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
@@ -264,7 +266,8 @@ def _front_of(
     table = pd.DataFrame(points, columns=[*problem.names])
     table = table.assign(**{name: own for name, own in counts.items() if name not in table})
     engines = tuple(map(problem.engine, chosen))
-    return Front(table, plans, engines, not stopped, spent, stopped=stopped)
+    moved = tuple(moved for _, moved in judged)
+    return Front(table, plans, engines, not stopped, spent, moved, stopped=stopped)
 
 
 def _found(name: str, problem: FrontProblem, solve: Callable[[], object]) -> list[Solution]:

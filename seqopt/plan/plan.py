@@ -48,6 +48,7 @@ from seqopt.stability.standing import Standing
 from seqopt.work.progress import Tell
 
 PROOFS = Later("seqopt.judge._schedules")  # 20 ms
+SPENT = Later("seqopt.plan._spent")  # where it is asked for
 STEPS = Later("seqopt.stability._steps")  # where it is asked whether steps stand
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -432,28 +433,12 @@ class Plan(ShownBuild):
 
     @property
     def spent(self) -> dict[str, dict[str, Any]]:
-        """What was computed to choose and to prove, beside what had to be.
-
-        ``models``: ``searched``, ``six_digits`` of them, ``proof`` (None without one), and
-        ``states`` in that; ``responses``: ``asked`` by goals, criterion and limits, and
-        ``computed``, beside grip forces, which come with all; ``verdicts``: ``asked`` of grip sets,
-        and the linear ``programs`` that these took.
-        """
-        graph, proof = self.states, self.certificate
-        stands = None if graph.standing is None else graph.stability
-        return {
-            "models": {
-                "searched": self.models,
-                "six_digits": graph.six_digit_models,
-                "proof": None if proof is None or self.gap is None else proof.models or self.models,
-                "states": 0 if proof is None else proof.states,
-            },
-            "responses": {"asked": sorted(graph.asked), "computed": sorted(graph.sets.names)},
-            "verdicts": {
-                "asked": 0 if stands is None else stands.looked_at,
-                "programs": 0 if stands is None else stands.programs,
-            },
-        }
+        """What was computed to choose and prove, beside what had to be: `seqopt.plan._spent`."""
+        proof = None if self.gap is None else self.certificate
+        spent: dict[str, dict[str, Any]] = SPENT.spent_on(
+            self.states, self.steps, self.models, proof
+        )
+        return spent
 
     def _answer(self) -> dict[str, object]:
         """Return the entries of a summary about values and what is proven of them."""

@@ -84,7 +84,9 @@ def failure_blocks(scene: Scene, found: FailureMap, wrapped: Callable[[str], str
         lines.append(f"{f'{build}, {holds}':{_NAME}}{rows['steps'].iloc[0]:5}{cells}")
     if not found.cases[["fall", "undecided"]].to_numpy().any():
         return ["\n".join(lines), "every step is proven to stand, in every case"]
-    cures = [f"What falls first, {axis} {found.usual:.3g}, and what would cure it"]
+    name, _, unit = axis.partition(", ")
+    where = f"{name} {found.usual:.3g} {unit}".rstrip()
+    cures = [f"What falls first, {where}, and what would cure it"]
     at = (found.cases["value"] == found.usual) & (found.cases["fall"] > 0)
     for case in found.cases[at].to_dict(orient="records"):
         joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""

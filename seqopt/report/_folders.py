@@ -14,6 +14,7 @@ from seqopt._registry import Later
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_in_postures, tasks_json
+from seqopt.plan._spent import Spent, spent_on
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
@@ -91,6 +92,14 @@ def front_counts(front: Front) -> dict[str, object]:
     return {**counts, "seconds": dict(front.seconds)}
 
 
+def front_spent(front: Front) -> Spent:
+    """Return what was computed for a Pareto set; its proof counts among what was searched."""
+    graph = graph_of(front.problem)
+    spent = spent_on(graph, [step for steps in front.steps for step in steps], graph.models)
+    spent["models"]["proof"] = graph.models if front.complete else None
+    return spent
+
+
 def numbered(front: Front) -> pd.DataFrame:
     """Return the table of a Pareto set, its points counted from 1."""
     table = shown_table(front.table)
@@ -128,9 +137,11 @@ def front_files(
         points["order"] = [",".join(map(str, order)) for order in orders]
     plans = [table.assign(point=number) for number, table in enumerate(tables.values(), start=1)]
     methods = method_tables(engine)[0]
+    page = front_page(engine, front, tables, left, verdicts)
+    summary["spent"] = front_spent(front)  # with what the page took
     return {
         "scene.json": dump_scene(engine.network.scene),
-        PAGE: front_page(engine, front, tables, left, verdicts),
+        PAGE: page,
         "pareto.csv": csv_text(points),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         "summary.json": json.dumps(summary, indent=2) + "\n",

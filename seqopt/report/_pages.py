@@ -29,7 +29,7 @@ from seqopt.responses.table import (
     Departure,
     LinearRange,
     _steps_in_table,
-    analyze,
+    analyze_builds,
     builds_in_words,
 )
 from seqopt.scene.scene import Scene
@@ -173,7 +173,7 @@ def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
             "compare has written"
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
-    tables = {name: analyze(engine, steps) for name, steps in plans.items()}
+    tables = analyze_builds(engine, plans)
     left = LinearRange(engine).of_builds(tables)
     builds = _builds(scene, tables, left, prover.of_builds(plans))
     shown = [_worst_table(scene, builds)]

@@ -22,7 +22,7 @@ import numpy as np
 
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, KnownRows
-from seqopt.engines.interface import Engine, Want, linear_limit
+from seqopt.engines.interface import Engine, NamedEngine, Want, linear_limit
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, SceneError
@@ -120,10 +120,14 @@ def work(states: int, bricks: int) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answers(FrozenValue):
-    """The requested responses of a block (S,), SI units, and sizes of grip forces (S, r), N."""
+    """The requested responses of a block (S,), SI units, and sizes of grip forces (S, r), N.
+
+    ``corrected``: how many of its sets an engine of another process had to correct.
+    """
 
     values: Mapping[str, Floats]
     forces: Floats
+    corrected: int = 0
 
 
 def answer(engine: Engine, block: Block) -> Answers:
@@ -225,6 +229,10 @@ class GripSets:
         """Number of distinct grip sets solved."""
         return self._known.count
 
+    def solved_by(self, other: GripSets) -> int:
+        """Return how many of these grip sets another one has solved too."""
+        return self._known.shared(other._known)
+
     @property
     def nbytes(self) -> int:
         """Memory of the responses, bytes."""
@@ -289,8 +297,11 @@ def solve_sets(
     own = resources if len(parts) > 1 else HERE  # to share one part does not pay
     progress = Progress("responses", sets.work, own.progress)
 
-    def done(part: Block, _: Answers) -> None:
+    def done(part: Block, found: Answers) -> None:
         progress.add(part.work)
+        if crew is not None and isinstance(engine, NamedEngine):  # else it has counted itself
+            engine.answered += len(part.grips)
+            engine.corrected += found.corrected
 
     rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
     with hire(own.executor, own.workers) as crew:
@@ -305,8 +316,10 @@ def solve_sets(
 def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
     """Return answers; ``loose``: infinite for mechanisms, which are isolated by bisection."""
     engine, count = unpacked(engine), len(block.grips)
+    before = getattr(engine, "corrected", 0)
     try:
-        return answer(engine, block)
+        found = answer(engine, block)
+        return replace(found, corrected=getattr(engine, "corrected", 0) - before)
     except MechanismError:
         if not loose:
             raise
@@ -316,7 +329,8 @@ def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
     halves = block.grips[: count // 2], block.grips[count // 2 :]
     parts = [_answer(engine, replace(block, grips=half), loose=True) for half in halves]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in block.names}
-    return Answers(values, np.concatenate([part.forces for part in parts]))
+    forces = np.concatenate([part.forces for part in parts])
+    return Answers(values, forces, sum(part.corrected for part in parts))
 
 
 class ScenarioSets:

@@ -94,6 +94,17 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     return _table_of(_analyzed(engine, steps))
 
 
+def analyze_builds(engine: Engine, builds: Mapping[str, Sequence[Step]]) -> dict[str, pd.DataFrame]:
+    """Return the tables of `analyze` of builds by name; states that they share are solved once."""
+    states = _distinct(builds.values())
+    known = dict(zip(states, _each_fields(engine, states.values()), strict=True))
+    each = {name: [known[step.bricks, step.grips] for step in own] for name, own in builds.items()}
+    return {
+        name: response_table(engine.network, zip(own, each[name], strict=True))
+        for name, own in builds.items()
+    }
+
+
 def _analyzed(engine: Engine, steps: Sequence[Step]) -> dict[str, list[object]]:
     """Return the columns of `analyze`, with None where a robot does not grip."""
     if not isinstance(getattr(engine, "network", None), Network):

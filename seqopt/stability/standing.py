@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from math import degrees, pi
 from operator import le
@@ -256,6 +256,12 @@ class StandingSets:
         for nodes, kind in zip(held.T, kinds.T, strict=True):
             codes = (codes * self._most + nodes) * len(self._payloads) + kind
         return codes
+
+
+def counted(every: Iterable[StandingSets]) -> dict[str, int]:
+    """Return how many verdicts were asked of grip sets, what they took, and how many are open."""
+    sets, names = [*every], ("looked_at", "programs", "undecided")
+    return {name: sum(getattr(each, name) for each in sets) for name in names}
 
 
 def _size(name: str, value: float) -> float:

@@ -13,6 +13,7 @@ from seqopt._cli.main import main
 from seqopt._cli.signatures import Call, signature_of
 from seqopt._cli.words import HIDDEN
 from seqopt._registry import COMMANDS
+from seqopt.contact.mortar import DRY, EPOXY, find_mortar
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.workflow import optimize, pose_build
 from tests.builders import small_arch
@@ -192,3 +193,39 @@ def test_props_are_said_in_words(capsys, tmp_path):
     props = load_scene(own).props
     assert len(props) >= 5
     assert {prop.stiffness for prop in props} == {(1e5,) * 3}
+
+
+def test_an_older_word_does_as_before_and_says_the_new_one(capsys):
+    scene = "chain:bricks=7"
+    words = ("optimize", scene, "--schedule", "free", "--json", "--no-stability")
+    for older in (("--criteria", "weighted"), ("--criteria=weighted",)):
+        status, out, err = command(capsys, *words, *older)
+        assert (status, err.splitlines()[0]) == (0, "seqopt: --criteria is called --criterion now")
+        assert json.loads(out)["summary"]["criterion"].startswith("weighted")
+    _, new, err = command(capsys, *words, "--criterion", "weighted")
+    assert "is called" not in err
+    assert json.loads(new)["summary"]["objective"] == json.loads(out)["summary"]["objective"]
+    quiet = ("pareto", scene, "--aim", "minmax,steps", "--criteria", "weighted", "--quiet")
+    assert "is called" not in command(capsys, *quiet)[2]
+
+
+def test_a_pareto_set_takes_a_criterion_as_others_do(capsys):
+    scene, aim = "chain:bricks=7", "minmax,steps"
+    for name in ("worst-ratio-published", "weighted"):
+        plan = seqopt.optimize(scene, "free", name, aim="minmax,steps")
+        front = seqopt.pareto(scene, aim=aim, criterion=name)
+        assert front.table["minmax"][0] == pytest.approx(plan.objective["minmax"], rel=1e-9)
+        words = ("pareto", scene, "--aim", aim, "--criterion", name, "--json", "--no-stability")
+        (row, *_) = json.loads(command(capsys, *words)[1])["points"]
+        assert row["minmax"] == pytest.approx(plan.objective["minmax"], rel=1e-9)
+    ends = {
+        seqopt.pareto(scene, aim=aim, criterion=n).table["minmax"][0] for n in (None, "weighted")
+    }
+    assert len(ends) == 2  # else the criterion would count for nothing
+
+
+def test_help_says_the_friction_that_is_taken():
+    (said,) = {f"{mortar.friction:.3g}" for mortar in (DRY, EPOXY, find_mortar("bond=1e4"))}
+    texts = signature_of(seqopt.assess).texts()
+    assert f"default: {said}, of 25°, with every mortar" in texts["friction"][1]
+    assert "°" not in texts["mortar"][1]

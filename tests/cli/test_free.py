@@ -152,7 +152,7 @@ def test_samples_alone_ask_for_the_worst_peak(capsys, arch):
 @pytest.mark.parametrize("aim", ["worst-peak", "cvar=0.5"])
 def test_a_plan_over_scenarios_is_written(capsys, tmp_path, arch, aim):
     words = ("--robust", aim, "--scenarios", "4", "--seed", "5", "--out", tmp_path)
-    more = ("--criteria", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")
+    more = ("--criterion", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")
     status, out, err = run(capsys, "optimize", arch, *words, *more)
     assert (status, beside_models(err)) == (0, "")
     assert f"({aim})" in out

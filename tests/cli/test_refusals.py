@@ -38,7 +38,7 @@ BAD = {
     "optimize ARCH --schedule three-robot --robots rob1,rob2": "three-robot takes three",
     "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has width",
     "optimize ARCH --formulation beam --option width=wide": "width is 'wide'; give an int",
-    "optimize ARCH --criteria T_max=heavy": "'heavy' is not a positive",
+    "optimize ARCH --criterion T_max=heavy": "'heavy' is not a positive",
     "optimize ARCH --limit T_max": "--limit T_max",
     "optimize ARCH --limit payload=9": "values with --payload",
     # budgets
@@ -67,7 +67,7 @@ BAD = {
     f"{FREE} --option speed=1": "--option speed=1: schedule_search has width",
     f"{FREE} --formulation minimax --aim steps": "minimax: a sum comes first",
     f"{FREE} --formulation pareto_zones": "pareto_zones is for Pareto sets",
-    f"{FREE} --criteria equations-2-3": "it ranks the choices of a move",
+    f"{FREE} --criterion equations-2-3": "it ranks the choices of a move",
     f"{FREE} --tilt 3": "--tilt: it goes with --stands",
     f"{FREE} --stands dry --tilt 90": "give an angle from 0 to below pi/2",
     f"{FREE} --stands dry --rule payload=ignored": "holds up anything",

@@ -127,7 +127,7 @@ def test_without_words_it_shows_three_examples_that_are_commands(capsys):
         ("optimize --schedule free --rule newest=fre --out x", "free"),
         ("optimize --formulation beam --option widht=3 --out x", "width"),
         ("optimize --formulation beam --limit F_larges=3 --out x", "F_largest"),
-        ("optimize --formulation beam --criteria t_max --out x", "T_max"),
+        ("optimize --formulation beam --criterion t_max --out x", "T_max"),
         ("optimize --robust worst-peak --vary stifness=2 --out x", "stiffness"),
         ("pareto chain:bricks=7 --aim D_mx --out x", "D_max"),
         ("import a.obj --unit mmm --out x", "mm"),

@@ -9,11 +9,13 @@ import pytest
 
 import seqopt
 from experiments.failing.parts import engine_cells, step_cells
+from experiments.failing.where_methods_fail import HOLDS
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
 from tests.builders import six_bricks
+from tests.commands import command
 from tests.quality.kernels import NAMES, every, other, running
 
 
@@ -82,6 +84,36 @@ def test_own_programs_agree_with_the_verdicts_and_contradict_false_ones(monkeypa
     monkeypatch.setattr(step_cells, "find_mortar", lambda _: Mortar(friction=1, cohesion=1e6,
                         tensile_strength=1e6))  # fmt: skip
     assert next(step_cells.rows(*asked))["contradicted"] == row["fall"]
+
+
+BOXES = ["x,y,z,length,width,height"]
+BOXES += [f"{x},0,{0.2 * k + 0.1:g},0.6,0.3,0.2" for k, x in enumerate((0, 0.15, 0.4, 0.75))]
+
+
+@pytest.mark.parametrize(
+    ("scene", "values"),
+    [
+        ("wall:columns=3,courses=3,corbel=0.08", {"friction": (0.2,), "tilt": (8.0,)}),
+        ("boxes", {"friction": (0.2,), "tilt": (0.0, 6.0)}),
+        pytest.param(
+            "vault:span=1,rise=0.4,columns=2", {"friction": (0.5,)}, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_own_programs_agree_where_nothing_is_an_arch(scene, values, tmp_path, capsys):
+    """A wall that overhangs, a stack of a reader's own blocks, a vault; bonded ones fall less."""
+    if scene == "boxes":
+        (tmp_path / "boxes.csv").write_text("\n".join(BOXES), encoding="utf-8")
+        scene = tmp_path / "boxes.json"
+        words = ("import", tmp_path / "boxes.csv", "--unit", "m", "--density", "2000")
+        assert command(capsys, *words, "--out", scene)[0] == 0
+    loaded = seqopt.load_scene(scene)
+    builds = {"sequential": seqopt.sequential(seqopt.build_network(loaded))}
+    rows = [*step_cells.rows(loaded, builds, ["dry", "bond=2e4"], values)]
+    assert sum(row["contradicted"] + row["undecided"] + row["own_open"] for row in rows) == 0
+    falls = {mortar: sum(r["fall"] for r in rows if r["mortar"] == mortar) for mortar in HOLDS}
+    assert falls["dry"] > falls["bond=2e4"]
+    assert all(row["fall"] == row["own_fall"] for row in rows)
 
 
 @pytest.mark.slow

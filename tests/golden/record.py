@@ -18,7 +18,7 @@ import pandas as pd
 from seqopt._cli.main import main
 
 VALUES = Path(__file__).parent / "values.csv"
-WORST = "--criteria worst-ratio-published"
+WORST = "--criterion worst-ratio-published"
 FREE = "optimize arch25 --schedule free"
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 QUICK = {
@@ -56,12 +56,12 @@ SLOW = {
     f"--durations {DURATIONS}",
     "taken down": f"{FREE} --direction take-down {WORST}",
     "chain of 49": "optimize chain:bricks=49 --schedule free --aim minmax,steps "
-    "--criteria worst-ratio",
+    "--criterion worst-ratio",
 }
 LONG = {
     "order": f"{FREE} --order search {WORST}",
     "front": "pareto arch25",
-    "chain of 97": "optimize chain:bricks=97 --schedule free --criteria worst-ratio",
+    "chain of 97": "optimize chain:bricks=97 --schedule free --criterion worst-ratio",
 }
 OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node
 1,place,1,?,,
@@ -83,7 +83,7 @@ SCHEDULES = {
     "free": ["--schedule", "free"],
     "free, order sought": ["--schedule", "free", "--order", "search"],
 }
-WORTH = ["--criteria", "worst-ratio-published"]
+WORTH = ["--criterion", "worst-ratio-published"]
 STATES = ["--aim", "minmax"]
 SCENARIOS = ["--scenarios", "2"]
 OVER_STATES = ("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip")

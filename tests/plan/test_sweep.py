@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -90,3 +91,21 @@ def test_a_command_sweeps_ranges_and_options(tmp_path, capsys):
 def test_ranges_that_are_none_are_refused(words, said, capsys):
     assert told(*words) == 2
     assert said in capsys.readouterr().err
+
+
+def test_workers_begin_with_the_largest_of_a_range():
+    """Ranges go up: else the largest problem would end alone."""
+    begun = []
+
+    def refused(own):
+        begun.append(own["size"])
+        raise ProblemError("too large")
+
+    given = {f"p{size}": {"size": size} for size in (1, 2, 3, 4)}
+    with ThreadPoolExecutor(1) as executor:
+        found = sweep(given, refused, executor=executor)
+    assert begun == [4, 3, 2, 1]
+    assert [*found["size"]] == [1, 2, 3, 4]  # as they were given
+    begun.clear()
+    sweep(given, refused)
+    assert begun == [1, 2, 3, 4]

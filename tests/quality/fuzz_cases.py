@@ -58,7 +58,7 @@ def _optimize(rng: np.random.Generator, _: object) -> list[str]:
     limit = pick(rng, ([], [], ["--limit", "payload"], ["--limit", "T_max=1e3"]))
     formulation = pick(rng, formulation_names())
     return [
-        *("--formulation", formulation, "--schedule", schedule, "--criteria", criterion),
+        *("--formulation", formulation, "--schedule", schedule, "--criterion", criterion),
         *(*limit, "--out", "out", "--engine", pick(rng, QUICK)),
     ]
 
@@ -74,7 +74,7 @@ MORE: dict[str, Callable[[np.random.Generator, bool], list[str]]] = {
     "compare": lambda _, __: [],
 }
 WRONG_WORDS = (
-    *("--out", "--plan", "--limit", "--option", "--criteria", "--export", "--no-proof"),
+    *("--out", "--plan", "--limit", "--option", "--criterion", "--export", "--no-proof"),
     *("scene.json", "plan.csv", "out/deep/er", "/dev/null", "/dev/full", "/nowhere/out", ".", ""),
     *("width=0", "width=-3", "width=10000000", "horizon=2", "charge=later", "F_rob1=1", "F_sup=1"),
     *("T_max=nan", "T_max=1e-320", "payload", "1e400", "-1", "\udcff", "\x1b[31m", "x" * 5000),

@@ -184,6 +184,7 @@ def test_no_response_is_computed_that_nobody_asks_for():
         assert {*spent["responses"]["computed"]} <= {*spent["responses"]["asked"]}
         assert 0 <= spent["models"]["six_digits"] <= spent["models"]["searched"] == plan.models
         assert spent["verdicts"] == {"asked": 0, "programs": 0}
+        assert spent["models"]["needed"] <= spent["models"]["answered"]
     assert spent["responses"]["computed"] == ["T_max"]
 
 

@@ -269,6 +269,6 @@ def test_the_command_line_offers_them(capsys, tmp_path):
     out = ["--out", str(tmp_path / "out")]
     assert main([*words, *out, "--limit", "F_sup=9"]) == 2
     assert "F_[each], F_[max], F_[sup]" in capsys.readouterr().err
-    assert main([*words, *out, "--criteria", "F_[sup],T_max", "--limit", "F_[max]=900"]) == 0
+    assert main([*words, *out, "--criterion", "F_[sup],T_max", "--limit", "F_[max]=900"]) == 0
     table = pd.read_csv(tmp_path / "out" / "plan.csv")
     assert {"F_sup_N", "F_[sup]_N", "F_max_N", "F_[max]_N"} <= set(table)

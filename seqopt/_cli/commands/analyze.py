@@ -26,7 +26,13 @@ from seqopt.work.progress import Tell, with_progress
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
-def run(asked: Annotated[Call, ("call", analyze)], *, out: File = None, progress: Tell) -> Answer:
+def run(
+    asked: Annotated[Call, ("call", analyze)],
+    *,
+    out: File = None,
+    details: bool = False,
+    progress: Tell,
+) -> Answer:
     """Compute how the structure responds in every step of one sequence, and write a table.
 
     It has the columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in
@@ -36,6 +42,8 @@ def run(asked: Annotated[Call, ("call", analyze)], *, out: File = None, progress
     ----------
     out : pathlib.Path, optional
         CSV file to write (default: standard output).
+    details : bool
+        As of `optimize`.
 
     Examples
     --------
@@ -70,7 +78,10 @@ def run(asked: Annotated[Call, ("call", analyze)], *, out: File = None, progress
         *(f"props: {fault}" for fault in _prop_faults(scene, table)),
         *_idle_note(scene, "robots", steps),
     ]
-    facts = {**answer.facts, "enough": enough.facts()}
+    models = {"needed": len({(step.bricks, step.grips) for step in steps if step.bricks})}
+    models |= {name: getattr(build.engine, name, 0) for name in ("answered", "corrected")}
+    notes += [remarks.spent_said({"models": models})] if details else []
+    facts = {**answer.facts, "enough": enough.facts(), "spent": {"models": models}}
     answer = replace(answer, facts=facts, notes=(*notes,))
     over, left = remarks.exceeded(scene, table), within.departures(table)
     return remarks.marked(answer, left, over, unreached=arm_faults(scene, solved))

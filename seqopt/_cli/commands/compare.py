@@ -42,7 +42,7 @@ def run(asked: Annotated[Call, ("call", compare)], *, out: Folder = None, progre
     --------
     $ seqopt compare
     $ seqopt compare wall:columns=6,courses=4 --out wall
-    $ seqopt compare arch25 --criteria worst-ratio --json
+    $ seqopt compare arch25 --criterion worst-ratio --json
     $ seqopt compare arch25 --grips 1e6
     $ seqopt compare arch25 --grips 1e6 --speed 60 --out speed
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from math import isfinite
+from pathlib import Path
 from typing import Annotated, Any
 
 from seqopt._cli import outputs, remarks
@@ -41,6 +42,7 @@ def run(
     *,
     stability: bool = True,
     out: Folder = None,
+    details: bool = False,
     progress: Tell,
 ) -> Answer:
     """Choose where robots hold, over all steps of a sequence, by one formulation.
@@ -58,20 +60,23 @@ def run(
         or ``mortar``): quicker.
     out : pathlib.Path
         Folder to write plan, tables, summary and page to.
+    details : bool
+        Say in one line what was computed, beside what had to be.
 
     Examples
     --------
     $ seqopt optimize arch25 --out best
     $ seqopt optimize arch25 --schedule free --aim minmax,steps --out free
     $ seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry
-    $ seqopt optimize my.json --criteria worst-ratio --limit payload --out mine
+    $ seqopt optimize my.json --criterion worst-ratio --limit payload --out mine
     """
     output = Output(out, asked.words.get("scene"), asked.words.get("schedule"))
     output.require(*ALWAYS)
     words = asked.words
     mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=stability)
     plan: Plan = asked(mortar=mortar, progress=progress)
-    return answered(plan, output, {**words, "stability": stability}, progress)
+    more = {"stability": stability, "details": details}
+    return answered(plan, output, {**words, **more}, progress)
 
 
 def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -> Answer:
@@ -85,6 +90,11 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     verdicts = prover.of_builds({plan.title: plan.steps})
     report = partial(_report, plan, prover, tables, words)
     written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
+    showing = {**prover.spent, "pictures": _pictures(tables)}
+
+    def spent() -> list[str]:  # once all else is said
+        return [remarks.spent_said(plan.spent, showing)] if words["details"] else []
+
     early, over = plan.ended is End.INTERRUPTED, remarks.exceeded(scene, plan._columns)
     answer = Answer(
         {
@@ -95,7 +105,7 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
         },
         "\n".join(_lines(plan, verdicts, over, output)),
         written=written,
-        notes=(*_notes(plan, words.get("engine")), *remarks.refused(prover)),
+        notes=(*_notes(plan, words.get("engine")), *remarks.refused(prover), *spent()),
         failures=(INTERRUPTED,) if early else (),
         status=Status.INTERRUPTED if early else Status.DONE,
         scene=scene,
@@ -116,14 +126,18 @@ def _report(
         settings = robust.draw(plan.engine.network.scene).settings
         drawn = {"robust": str(robust.measure), "scenarios": settings}
     verdicts = prover.of_builds({plan.title: plan.steps}).get(plan.title, ())
-    pictures = sum(name.endswith((".png", ".svg")) for name in tables)
     counts = paper_models(_problem(plan).schedule) if plan.method == "three-robot" else ()
     return plan.summary() | {
         "models_paper_count": dict(zip(("cascading", "overlap"), counts, strict=False)) or None,
         "stability": {v.mortar: v.facts() for v in verdicts},
-        "spent_on_showing": {**prover.spent, "pictures": pictures},
+        "spent_on_showing": {**prover.spent, "pictures": _pictures(tables)},
         **drawn,
     }
+
+
+def _pictures(tables: Mapping[str, object]) -> int:
+    """Return how many pictures there are among files, in whatever formats."""
+    return len({Path(name).stem for name in tables if name.endswith((".png", ".svg"))})
 
 
 def _lines(

@@ -20,9 +20,9 @@ from seqopt.engines.registry import engine_mortar
 from seqopt.plan.front import Front
 from seqopt.plan.solve import graph_of
 from seqopt.questions import pareto
-from seqopt.report._folders import figure_notes, front_counts, front_files, numbered
+from seqopt.report._folders import figure_notes, front_counts, front_files, front_spent, numbered
 from seqopt.report.comparison import shown_table
-from seqopt.responses.table import Departure, LinearRange, analyze, builds_in_words
+from seqopt.responses.table import Departure, LinearRange, analyze_builds, builds_in_words
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability.failure_map import BuildVerdicts, find_prover
@@ -39,6 +39,7 @@ def run(
     *,
     stability: bool = True,
     out: Folder = None,
+    details: bool = False,
     progress: Tell,
 ) -> Answer:
     """Find every plan of the free schedule, or of a sequence with open grips, that no other beats.
@@ -52,6 +53,8 @@ def run(
         As of `optimize`.
     out : pathlib.Path, optional
         Folder to write.
+    details : bool, optional
+        As of `optimize`.
 
     Examples
     --------
@@ -86,6 +89,7 @@ def run(
         *(f"rules: {each}" for each in free.rules.relaxed(free.engine.network.scene)),
         *remarks.refused(next(iter(provers.values()))),
         *(figure_notes() if written else ()),
+        *([remarks.spent_said(front_spent(front))] if details else []),
     )
     answer = remarks.marked(_answer(front, free.engine, output, written), builds_in_words(left))
     answer = replace(answer, notes=(*answer.notes, *notes))
@@ -119,7 +123,7 @@ def _responses(front: Front) -> tuple[dict[str, pd.DataFrame], Departures]:
     """Return the responses of the steps of every plan, and where they leave the linear range."""
     each, left = dict[str, pd.DataFrame](), dict[str, Sequence[Departure]]()
     for own, builds in _by_engine(front).items():
-        found = {name: analyze(own, steps) for name, steps in builds.items()}
+        found = analyze_builds(own, builds)
         each |= found
         left |= LinearRange(own).of_builds(found)
     names = [f"point {number}" for number in range(1, len(front.steps) + 1)]

@@ -30,6 +30,7 @@ def run(
     asked: Annotated[Call, ("call", replan)],
     stability: bool = True,
     out: Folder = None,
+    details: bool = False,
     progress: Tell,
 ) -> Answer:
     """Plan the rest of a build from one of its steps, after something has changed.
@@ -46,6 +47,8 @@ def run(
         As of `optimize`.
     out : pathlib.Path, optional
         Folder to write the new plan to.
+    details : bool, optional
+        As of `optimize`.
 
     Examples
     --------
@@ -62,7 +65,8 @@ def run(
         notes = (f"steps: of the best free schedule, {plan.result}",)
     mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=stability)
     new: Plan = asked(build=given, mortar=mortar, progress=progress)
-    answer = answered(new, output, {**words, "stability": stability}, progress)
+    more = {"stability": stability, "details": details}
+    answer = answered(new, output, {**words, **more}, progress)
     return replace(
         answer,
         facts={**answer.facts, "replanned": new.changes},

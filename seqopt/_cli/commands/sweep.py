@@ -8,6 +8,7 @@ from itertools import product
 from typing import Annotated
 
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.arguments import RENAMED
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, Option, signature_of
 from seqopt._cli.words import Folder
@@ -40,7 +41,8 @@ def run(
     ----------
     over : sequence of str
         An option of optimize that differs too: values with commas, or a range, as
-        payload=250..400/4, grips=1e5..1e9/5log, criteria=worst-ratio,weighted, scene=a.json,b.json.
+        payload=250..400/4, grips=1e5..1e9/5log, criterion=worst-ratio,weighted,
+        scene=a.json,b.json.
     stability : bool
         If not, it is not counted how many steps fall, dry and with epoxy.
     out : pathlib.Path
@@ -88,6 +90,7 @@ def _problems(over: Sequence[str], scene: str) -> dict[str, Mapping[str, str]]:
     differs: dict[str, Sequence[str]] = {"scene": spread(scene)}
     for each in over:
         name, sign, values = each.partition("=")
+        name = RENAMED.get(f"--{name}", name).removeprefix("--")
         if name not in flags or not sign:
             hint = did_you_mean(name, flags)
             raise ProblemError(

@@ -126,6 +126,7 @@ class StackedEngines:
         for k, engine in enumerate(engines):
             rows = slice(k * len(numbers), (k + 1) * len(numbers))
             out, wrong = Extremes(*(each[rows] for each in joined)), ~sure[rows]
+            engine.answered += int(np.count_nonzero(~wrong))
             if wrong.any():
                 better = engine._extremes(bricks, numbers[wrong], want)
                 for values, others in zip(out, better, strict=True):

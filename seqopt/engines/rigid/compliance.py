@@ -220,6 +220,7 @@ class ComplianceEngine(NamedEngine):
     def _found(self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want) -> Fields:
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
         size = len(self.network.inner)
+        self.answered += len(columns)
         if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
                 last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
@@ -265,6 +266,7 @@ class ComplianceEngine(NamedEngine):
                 self._grown = _EXTREMES.GrownExtremes(self._builder)
             self._grown.reach(bricks)
             found, size, apart = self._grown.solve(columns, want, self._accepted(want) / _UNSEEN)
+            self.answered += int(np.count_nonzero(~apart))
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], RIGID, want)
             rest = _extremes_in(require_finite(fields, bricks, numbers[apart]), want)
@@ -322,6 +324,7 @@ class ComplianceEngine(NamedEngine):
         self, bricks: int, columns: Ints, compliance: GripCompliance, want: Want
     ) -> Fields:
         """Return the fields of grip sets for which the operator is not accurate enough."""
+        self.corrected += len(columns)
         tied = bricks <= len(self._tree.spring)  # the tree that operators grow on reaches them all
         operator = self._operator(bricks, columns) if tied else None
         with one_thread():
