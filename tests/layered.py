@@ -1,7 +1,5 @@
 """Costs of candidates as tests draw them, and what formulations answer for them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from itertools import product
 
