@@ -1,7 +1,5 @@
 """Blocks that are no boxes, and box scenes written as if their bricks were none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A headless browser, where there is one."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

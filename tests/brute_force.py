@@ -1,7 +1,5 @@
 """Free schedules of small builds by a graph of labeled robots, whose states are solved alone."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import networkx as nx

@@ -1,7 +1,5 @@
 """Scenes, engines and measures that several tests share."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -30,8 +28,6 @@ def solve_batch(operator, columns, want=Want.RESPONSES, *, even=True, accuracy=A
 
 
 # scenes
-
-
 def six_bricks(pattern="VLR"):
     """An arch of six bricks, closed at both ends."""
     return arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern))
@@ -203,8 +199,6 @@ def far_reaching(scene):
 
 
 # the same scene elsewhere and in other units
-
-
 def about_vertical(angle):
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -281,8 +275,6 @@ def rescaled(scene, length, force, softness):
 
 
 # answers and programs
-
-
 def solve(engine_type, scene, bricks, grips, want):
     return engine_type(build_network(scene)).solve(bricks, grips, want)
 

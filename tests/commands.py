@@ -1,7 +1,5 @@
 """Commands run as a user runs them, warnings being errors."""
 
-from __future__ import annotations
-
 from seqopt._cli.main import main
 
 

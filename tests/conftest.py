@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import gc
 import os
 import re
@@ -15,6 +13,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from seqopt._registry import ADDED
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.plan.solve import pose
@@ -87,3 +86,12 @@ def loop25(engine25):
 @pytest.fixture(scope="session")
 def problem25(engine25, loop25):
     return pose(engine25, loop25, EQUATIONS)
+
+
+@pytest.fixture
+def alone():
+    """Forget what a test registers."""
+    before = {**ADDED}
+    yield
+    ADDED.clear()
+    ADDED.update(before)

@@ -1,7 +1,5 @@
 """Rigid bricks by the assembled stiffness of each grip set: an independent route, and no engine."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +15,23 @@ from seqopt.network.network import Network
 
 _ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
 _BACKWARD = 1e-10  # largest backward error of an accepted solution
+
+
+@dataclass(frozen=True)
+class RigidStructure:
+    """The parts of the stiffness of one partial structure."""
+
+    acting: Ints  # (s,); the springs that act
+    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
+    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
+    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
+    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
+    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
+    statics: Statics  # of the network
+
+    def forbidden(self, grips: Ints) -> Floats:
+        """Return the motions (3r, 6b) that grips forbid."""
+        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
 
 
 def solve_dense(
@@ -64,23 +79,6 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
     solution = Solution(twist[None], wrench[None], force[None])
     return respond(network, parts.statics, parts.motion, grips[None], solution)
-
-
-@dataclass(frozen=True)
-class RigidStructure:
-    """The parts of the stiffness of one partial structure."""
-
-    acting: Ints  # (s,); the springs that act
-    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
-    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
-    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
-    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
-    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
-    statics: Statics  # of the network
-
-    def forbidden(self, grips: Ints) -> Floats:
-        """Return the motions (3r, 6b) that grips forbid."""
-        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
 
 
 def rigid_structure(network: Network, bricks: int) -> RigidStructure:

@@ -1,7 +1,5 @@
 """Small documents in the formats of others, as their packages write them."""
 
-from __future__ import annotations
-
 from tests.blocks import box
 
 LOW, HIGH = box((2.0, 1.0, 0.5)), box((1.0, 1.0, 0.5), at=(0.25, 0.0, 0.5))

@@ -1,7 +1,5 @@
 """Scenes and grip sets at the limits of the engines: long, slender, loose, badly held."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is wrong with a figure, as a reader of the site would see it."""
 
-from __future__ import annotations
-
 import re
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """The rules of a free schedule in plain words, state by state, for tables to agree with."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property

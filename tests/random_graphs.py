@@ -1,7 +1,5 @@
 """Small graphs with whole amounts, and every path of them."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

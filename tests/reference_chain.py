@@ -6,8 +6,6 @@ stiffness of what is left is factored brick by brick in build order with the dec
 standard library. In a chain the factor is block tridiagonal, in a wall it has a course's width.
 """
 
-from __future__ import annotations
-
 from decimal import Context, Decimal, localcontext
 from typing import Any, NamedTuple
 

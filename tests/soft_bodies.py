@@ -5,8 +5,6 @@ balance: one matrix, factored in double precision, the answer corrected with res
 digits. For the grips' forces and the nodes' displacements alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import linalg, sparse
 

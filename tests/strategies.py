@@ -1,7 +1,5 @@
 """What property tests draw: scenes, grip sets, placement problems."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The picture of the design, held against every import; see docs/architecture.md."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -286,9 +284,8 @@ print(sum(name.partition(".")[0] in ("seqopt", "formulations") for name in sys.m
 """
 
 
-@pytest.mark.parametrize(
-    "moves", [pytest.param(m, marks=[pytest.mark.slow] * m.startswith("seqopt.")) for m in LOADED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("moves", LOADED)
 def test_a_plain_certified_plan_loads_few_modules(moves):
     program = [sys.executable, "-c", PLAIN_PLAN.format(moves=moves)]
     done = subprocess.run(program, cwd=ROOT, check=True, capture_output=True, text=True)

@@ -1,7 +1,5 @@
 """Docstrings: a sentence for whatever is public, and whole sections for what others build on."""
 
-from __future__ import annotations
-
 import inspect
 import pkgutil
 from dataclasses import dataclass

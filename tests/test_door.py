@@ -1,7 +1,5 @@
 """The door: what ``import seqopt`` gives; it, help and commands load what they need alone."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys
@@ -61,6 +59,7 @@ STAGES = {  # what one interpreter does, one after the other, and what is not lo
 }
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_before_it_is_needed():
     """In a fresh interpreter; in the end a table of pandas shows that loading is seen."""
     code = "import contextlib, io, sys\n"

@@ -1,7 +1,5 @@
 """Every example in a docstring prints what it shows; the door and the rooms' pages have one."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import inspect

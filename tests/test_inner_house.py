@@ -1,7 +1,5 @@
 """The inner house stands alone: it plans the same where every outer room is taken away."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Python's functions, one for each question: what they take, and that commands answer alike."""
 
-from __future__ import annotations
-
 import inspect
 import io
 import json

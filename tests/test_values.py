@@ -1,7 +1,5 @@
 """Frozen values: read-only for good, compared by content, short at the prompt."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What is given in Python in another form: what is meant is taken, or what is wanted is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -43,6 +41,7 @@ def test_methods_take_a_scene(method):
 WIDE = seqopt.Search(options={"width": 3})
 
 
+@pytest.mark.slow
 def test_what_is_meant_is_taken(tmp_path):
     assert Robot(name="r", payload=1.0, reach="anywhere").reach == Anywhere()
     assert seqopt.make_engine("discrete", SCENE, "dry").network.scene == SCENE

@@ -101,8 +101,9 @@ def steps(*, quick: bool) -> pd.DataFrame:
     for name in SCENES[:1] if quick else SCENES:
         scene = scene_named(name)
         net = build_network(scene)
-        builds = {"sequential": sequential(net), "cantilever": cantilever(net)}
-        axes = {axis: values[1:3] for axis, values in AXES.items()} if quick else AXES
+        builds = {"sequential": sequential(net)}
+        builds |= {} if quick else {"cantilever": cantilever(net)}
+        axes = {axis: values[1:2] for axis, values in AXES.items()} if quick else AXES
         out += step_cells.rows(scene, builds, HOLDS, axes)
     return pd.DataFrame(out)
 

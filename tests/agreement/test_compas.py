@@ -3,8 +3,6 @@
 The samples ship with compas_cra 0.8 (ETH Zurich, Block Research Group, MIT license).
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 
@@ -22,6 +20,7 @@ from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict, assess
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore:scene .* rest on the ground"),  # shelves do
     pytest.mark.filterwarnings("ignore:scene .* interpenetrate"),  # stones of samples do
     pytest.mark.xdist_group("samples of compas_cra"),  # which one worker reads
@@ -29,15 +28,11 @@ pytestmark = [
 compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
-SNAKE = pytest.param("snake", marks=pytest.mark.slow)
-QUICK = ("bridge",)
-OTHERS = {*SAMPLES} - {"armadillo_cra", "snake", *QUICK}
 LARGE = ("cube-curve-short", "cube-curve-tall")  # curve-3-blocks has the same kind of faces
-SLOW = [
-    pytest.param(n, marks=[pytest.mark.slow, *[pytest.mark.long] * (n in LARGE)])
-    for n in sorted(OTHERS)
+SMALL = [
+    pytest.param(n, marks=[pytest.mark.long] * (n in LARGE))
+    for n in sorted({*SAMPLES} - {"armadillo_cra"})
 ]
-SMALL = [*QUICK, *SLOW, SNAKE]
 CURVED = {"curve-3-blocks", "cube-curve-short", "cube-curve-tall"}  # files have faces of the curves
 
 
@@ -70,7 +65,7 @@ def test_blocks_and_faces_are_those_of_compas_cra(name):
     assert structure(scene).area.sum() == pytest.approx(area, rel=near)
 
 
-@pytest.mark.parametrize("name", ["bridge", SNAKE])
+@pytest.mark.parametrize("name", ["bridge", "snake"])
 def test_verdicts_are_those_of_compas_cra(name):
     friction = SAMPLES[name].friction
     mine = assess(structure(imported(name)), Mortar(friction=friction))

@@ -1,7 +1,5 @@
 """The search that solves only the models it meets, against the one that is given all costs."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import cycle, pairwise, product
 
@@ -30,6 +28,8 @@ from seqopt.study import CRITERIA, EQUATIONS
 from tests.brute_force import FOUR, ONES, allowed, distance, whole_graph
 from tests.builders import Counting, small_arch
 
+pytestmark = pytest.mark.slow
+
 
 class Ticking(Watch):
     """A second goes by whenever it is looked at."""
@@ -57,11 +57,7 @@ def windows(schedule, nodes):
 
 
 @pytest.mark.parametrize(
-    ("criterion", "method"),
-    [
-        (FIRST, "three-robot"),
-        *(pytest.param(*each, marks=pytest.mark.slow) for each in zip(OTHERS, cycle(SCHEDULES))),
-    ],
+    ("criterion", "method"), [(FIRST, "three-robot"), *zip(OTHERS, cycle(SCHEDULES))]
 )
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
@@ -87,7 +83,6 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     assert found.models < plan.models
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("response", "bound"), [("M_sup", 12)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
@@ -108,7 +103,6 @@ def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
         walk(graph_of(problem), Ticking(time_limit=8.0))
 
 
-@pytest.mark.slow
 def test_what_must_stand_does_so_without_proof_as_well(engine25):
     problem = seqopt.pose(
         engine25, three_robot_loop(engine25.network), EQUATIONS, "sum", stands="dry"
@@ -118,8 +112,6 @@ def test_what_must_stand_does_so_without_proof_as_well(engine25):
 
 
 # schedules, aims, limits, budgets, standing, scenarios, candidates: any of them together
-
-
 FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 1,place,1,?,,,
 2,place,2,?,?,,
@@ -270,7 +262,6 @@ def best_of(plans, aims, caps):
     return out or None
 
 
-@pytest.mark.slow
 @given(data=st.data())
 @settings(max_examples=8)
 @pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])
@@ -289,7 +280,8 @@ def test_everything_goes_with_everything(name, data):
 
     def limited(bricks, grips):
         worst = allow(bricks, grips)
-        return None if worst is None or over(worst, response, bound) else worst
+        most = bound * (1 + LIMIT_TOLERANCE)
+        return None if worst is None or worst[FOUR.index(response)] > most else worst
 
     peaks = [each[-1] for each in every_path(name, candidates, allow, (*asked, response))]
     bound = float(np.quantile(peaks, pick(0.2, 1.0))) if peaks else 1.0
@@ -307,10 +299,6 @@ def test_everything_goes_with_everything(name, data):
     )
     formulation = find_formulation("schedule_search") if caps else pick(*PLANS)
     agree(problem, formulation, best, len(words))
-
-
-def over(worst, response, bound):
-    return worst[FOUR.index(response)] > bound * (1 + LIMIT_TOLERANCE)
 
 
 def agree(problem, formulation, best, aims):

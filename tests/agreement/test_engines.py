@@ -1,7 +1,5 @@
 """Independent routes, one answer: compliance operator, stiff-bar frame, direct rigid solve."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -170,8 +168,6 @@ def test_a_brick_on_springs_without_stiffness_is_loose(engine_type, grips):
 
 
 # the levels of fidelity: each equals the next where its condition is met, and says where not
-
-
 @settings(max_examples=8)
 @given(states(scenes=st.one_of(arches(max_bricks=5), walls(), both_sided())))
 def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
@@ -207,8 +203,6 @@ def test_what_comes_to_rest_is_proven_to_stand(number):
 
 
 # boxes written as polyhedra with faces of their own: the same answers by every engine
-
-
 PLAIN = build_network(six_bricks())
 SHAPED = build_network(with_shapes(six_bricks()))
 
@@ -267,8 +261,6 @@ def test_nodes_above_the_centroid_will_do_and_nodes_beside_it_not():
 
 
 # partial structures of all kinds: the engine agrees with an independent dense solver to 1e-9
-
-
 LARGEST = 1e-9  # difference over the largest entry of its kind
 EVERY = {"sequential": 1, "cantilever": 10}
 ARMADILLO = "armadillo_cra"

@@ -1,7 +1,5 @@
 """The plans of four arms on the page of examples, opened by those who would drive them."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import fields, is_dataclass, replace
@@ -74,6 +72,7 @@ def test_scenes_are_those_that_are_generated(build, tmp_path):
     assert load_scene(tmp_path / "again.json") == scene
 
 
+@pytest.mark.slow
 def test_compas_fab_takes_the_arms_of_the_tasks_there():
     """A cell of compas_fab puts the flange where the task has it, by its own kinematics."""
     kinematics = pytest.importorskip("compas_fab.backends.kinematics.solvers")

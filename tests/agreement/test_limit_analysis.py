@@ -1,7 +1,5 @@
 """The linear program of plane statics, by another solver."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 
@@ -73,8 +71,6 @@ def test_a_simplex_finds_the_same_bond(blocks, friction):
 
 
 # screens by linear programs against the certificate by cone programs, on random structures
-
-
 VERDICTS = {1: Verdict.STANDS, -1: Verdict.FALLS, 0: Verdict.UNDECIDED}
 MORTARS = [DRY, Mortar(friction=0.9), bond_mortar(2e3), Mortar(friction=0.3, cohesion=1e3)]
 MORTARS += [Mortar(friction=0.5, tensile_strength=2e3), Mortar(friction=0.0)]

@@ -1,7 +1,5 @@
 """Collapse loads against linear programs of plane blocks, written here from their corners."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ A sum and a worst value are over every step for which the criterion is defined: 
 them, ranks where a grip is open. Travel is that of all robots, from every grip to the next.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -35,6 +33,7 @@ WEIGHED = WeightedSum("weighed", (("T_max", 1.0, 10.0), ("F_largest", 2.0, 50.0)
 BY_BRICKS = StepCost("by bricks", ("M_sup", "T_max"), lambda r, b: b * r["M_sup"] + r["T_max"])
 CRITERIA = {"ratio": ONES, "weighed": WEIGHED, "by bricks": BY_BRICKS}
 GOALS = {Aim.SUM: "sum", Aim.PEAK: "minmax"}
+PAIRED = (Aim.SUM, Aim.PEAK, Aim.SUM)  # with schedules and criteria
 
 
 @cache
@@ -95,7 +94,10 @@ def of_steps(problem, aim):
 
 @pytest.mark.parametrize(
     ("schedule", "criterion", "aim"),
-    [*zip(SCHEDULES, CRITERIA, (Aim.SUM, Aim.PEAK, Aim.SUM), strict=True)],
+    [
+        pytest.param(*each, marks=[pytest.mark.slow] * (k > 0))
+        for k, each in enumerate(zip(SCHEDULES, CRITERIA, PAIRED, strict=True))
+    ],
 )
 def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, aim):
     problem = posed(schedule, criterion)
@@ -156,6 +158,7 @@ def ways(scene, steps):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["modified-sequential", "two-robot"])
 def test_travel_is_one_number(schedule):
     """The least that a goal says, and what a budget says that each plan goes."""
@@ -178,6 +181,7 @@ def test_travel_is_one_number(schedule):
             seen += 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("schedule", SCHEDULES[1:2])
 def test_steps_over_a_level_are_those_of_the_plan(schedule):
     """Steps without an open grip count, as in the table of the plan."""
@@ -197,8 +201,6 @@ def test_steps_over_a_level_are_those_of_the_plan(schedule):
 
 
 # one question in other words: as a criterion, a response, an amount or a filter of one's own
-
-
 def largest_force(states):
     return states.responses["F_largest"]
 

@@ -1,7 +1,5 @@
 """Builds that begin and end anywhere, against every plan of small builds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import permutations, product

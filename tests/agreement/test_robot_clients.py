@@ -1,7 +1,5 @@
 """Tasks and plans opened by those who read them: COMPAS, compas_fab, pandas."""
 
-from __future__ import annotations
-
 import io
 import re
 

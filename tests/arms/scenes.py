@@ -1,7 +1,5 @@
 """Small scenes whose robots have arms: the ABB IRB 4600-40/2.55 that ships with compas_fab."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -41,8 +39,6 @@ def beside(scene, along):
 
 
 # an arm of boxes beside a wall, as a URDF written by the test
-
-
 LENGTHS = (0.3, 0.2, 0.9, 0.8, 0.1, 0.1, 0.08)  # of links, m
 AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
 LIMIT = '<limit lower="-3.1" upper="3.1" effort="1" velocity="1"/>'
@@ -106,8 +102,6 @@ def beside_a_wall(urdf, *positions, names=("arm", "other"), **more):
 
 
 # robots whose grips give way by joints of arms without a model: their postures are given
-
-
 def with_joints(scene, stiffness, jacobians, hands=((None, None),), without=()):
     """The scene with robots on arms that hold every node in a posture that is given.
 

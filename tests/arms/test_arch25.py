@@ -1,7 +1,5 @@
 """Three ABB IRB 4600 around the arch of Bruun et al.: where the third one stands decides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

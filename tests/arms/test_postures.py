@@ -1,7 +1,5 @@
 """Postures of arms: where they are, what they hit, who keeps them; MuJoCo is the witness."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -111,6 +109,7 @@ def test_a_stiffness_is_needed_for_every_joint():
         seqopt.make_engine("compliance", two_arms(joint_stiffness=(1e6, 1e6)))
 
 
+@pytest.mark.slow
 def test_a_table_is_the_same_each_time_in_any_order_and_from_a_folder(scene, table, tmp_path):
     reached_alone.cache_clear()
     site = Site.of(scene)
@@ -185,11 +184,10 @@ def test_steps_are_checked_by_themselves(scene):
     states = [step for step in seqopt.sequential(without(scene)) if len(step.held) == 2]
     check_postures(scene, states[:1])
     with pytest.raises(StepError, match=f"step {states[0].number}: arms cannot hold"):
-        check_postures(hostile(scene.with_robots(*scene.robots[:2])), [held_by_two(states[0])])
-
-
-def held_by_two(step):
-    return replace(step, grips=step.grips[:2])
+        check_postures(
+            hostile(scene.with_robots(*scene.robots[:2])),
+            [replace(states[0], grips=states[0].grips[:2])],
+        )
 
 
 def without(scene):
@@ -225,6 +223,7 @@ def test_no_plan_is_said_where_arms_reach_nothing(scene):
         seqopt.optimize(far, "free", aim="steps", rules="least_grips=1")
 
 
+@pytest.mark.slow
 def test_no_plan_is_said_where_arms_are_in_each_others_way():
     """That is told from arms that do not reach, and computed with the postures of each alone."""
     close = beside(two_arms(), 0.6)
@@ -243,6 +242,7 @@ def test_no_plan_is_said_where_arms_are_in_each_others_way():
     assert plan.steps  # the control: what is said to help does
 
 
+@pytest.mark.slow
 def test_bases_must_not_stand_in_each_other(scene):
     with pytest.raises(SceneError, match="the base of its arm hits that of"):
         find_postures(beside(scene, 0.1))

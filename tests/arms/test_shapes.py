@@ -1,7 +1,5 @@
 """Links without shapes for collisions, and models that are no URDF."""
 
-from __future__ import annotations
-
 import re
 import warnings
 

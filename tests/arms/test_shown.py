@@ -1,7 +1,5 @@
 """Postures of a plan where people see them: tasks of robots, and arms that are drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -97,6 +95,7 @@ def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, c
     assert out.read_text(encoding="utf-8") == proposed
 
 
+@pytest.mark.slow
 def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
     scene, _ = read_folder(folder)
     seqopt.save_scene(beside(scene, 0.75), tmp_path / "scene.json")

@@ -1,7 +1,5 @@
 """Why an arm reaches a node with no posture, in words, and what there is to do."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -31,6 +29,7 @@ def reasons(scene):
     return {node: why for node, why in zip(rows["node"], rows["why"], strict=True) if why}
 
 
+@pytest.mark.slow
 def test_a_tool_in_the_model_is_found_and_its_end_named(tmp_path):
     urdf = boxes(tmp_path / "arm.urdf", gripper=True)
     found = reasons(beside_a_wall(urdf, **TOP))

@@ -1,7 +1,5 @@
 """Arms, bricks and the ground in MuJoCo: other kinematics and other collisions than seqopt has."""
 
-from __future__ import annotations
-
 import re
 
 import mujoco

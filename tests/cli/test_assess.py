@@ -1,7 +1,5 @@
 """The command ``assess``; a limit of time."""
 
-from __future__ import annotations
-
 import json
 import math
 import signal
@@ -24,6 +22,7 @@ ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
 
 
+@pytest.mark.slow
 def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
     """It said that every step stands, by an epoxy of 3 MPa that nobody had named."""
     out = tmp_path / "both.csv"
@@ -72,8 +71,6 @@ def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, 
 
 
 # a limit of time, and an interrupt, wherever a command is: what is there is not lost
-
-
 WALL = "wall:columns=2,courses=2"
 FREE = ("optimize", WALL, "--schedule", "free", "--aim", "minmax,steps")
 LOOP = ("optimize", WALL, "--formulation", "overlap_dp")

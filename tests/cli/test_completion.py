@@ -1,7 +1,5 @@
 """Completion: what the Tab key would offer."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -9,15 +7,16 @@ import sys
 import pytest
 
 pytest.importorskip("argcomplete")
+pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
     ("line", "want"),
     [
         ("seqopt op", {"optimize"}),
-        pytest.param("seqopt compare --engine dis", {"discrete"}, marks=pytest.mark.slow),
-        pytest.param("seqopt optimize --formul", {"--formulation"}, marks=pytest.mark.slow),
-        pytest.param("seqopt compare --engine qqq", set(), marks=pytest.mark.slow),
+        ("seqopt compare --engine dis", {"discrete"}),
+        ("seqopt optimize --formul", {"--formulation"}),
+        ("seqopt compare --engine qqq", set()),
     ],
 )
 def test_the_tab_key_offers_what_there_is(tmp_path, line, want):

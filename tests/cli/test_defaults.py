@@ -1,7 +1,5 @@
 """What is taken where nothing is asked for; scenes on the command line."""
 
-from __future__ import annotations
-
 import json
 
 import pandas as pd
@@ -54,6 +52,7 @@ def test_python_and_the_command_line_answer_alike(capsys, arch, words, given):
     assert (found["written"], found["exit_status"]) == ([], 0)
 
 
+@pytest.mark.slow
 def test_pareto_and_replan_are_what_python_finds(capsys, arch, tmp_path):
     words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
     found = answered(capsys, "pareto", arch, *words)["points"]
@@ -136,8 +135,6 @@ def test_another_question_is_another_problem():
 
 
 # scenes on the command line: those that are built in, grips and props of one's own
-
-
 ARCH = "arch:span=1,rise=0.4,bricks=6"
 
 

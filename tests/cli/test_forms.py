@@ -1,7 +1,5 @@
 """The three forms of an answer; where the command line reads and writes."""
 
-from __future__ import annotations
-
 import json
 import os
 import stat
@@ -47,6 +45,7 @@ def test_json_is_one_document_with_the_same_keys_everywhere(capsys, words):
     assert isinstance(found["notes"], list)
 
 
+@pytest.mark.slow
 def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):
     words = ("optimize", SMALL, "--formulation", "overlap_dp", "--out", tmp_path / "a")
     status, out, err = run(capsys, *words, "--json")
@@ -68,6 +67,7 @@ def test_an_answer_that_does_not_hold_is_still_a_document(capsys):
     assert found["verdicts"]["dry"]["does not stand"]
 
 
+@pytest.mark.slow
 def test_quiet_prints_the_paths_of_what_is_written(capsys, tmp_path):
     folder, path = tmp_path / "a", tmp_path / "s.json"
     words = ("optimize", SMALL, "--formulation", "overlap_dp", "--out", folder)
@@ -91,8 +91,6 @@ def test_values_as_json_can_hold_them():
 
 
 # where the command line reads and writes: files of others, never over its input
-
-
 PLAN = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
 
 

@@ -1,7 +1,5 @@
 """The free schedule; parts of builds."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -40,6 +38,7 @@ def test_optimize_writes_a_plan_that_reads_back(capsys, tmp_path, arch):
     assert load_scene(out / "scene.json") == load_scene(arch)
 
 
+@pytest.mark.slow
 def test_a_loop_by_its_states(capsys, tmp_path, arch):
     """Aims, limits and standing go with schedules of open grips too."""
     out = tmp_path / "out"
@@ -53,6 +52,7 @@ def test_a_loop_by_its_states(capsys, tmp_path, arch):
     assert (pd.read_csv(out / "stability.csv")["verdict"] == "stands").all()
 
 
+@pytest.mark.slow
 def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
     out = tmp_path / "front"
     words = ["--aim", "F_largest,M_sup", "--round", "M_sup=0.5"]
@@ -71,6 +71,7 @@ def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
     assert load_scene(out / "scene.json") == load_scene(arch)
 
 
+@pytest.mark.slow
 def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ["--schedule", "free", "--order", "search", "--aim", "F_largest,steps"]
@@ -128,9 +129,8 @@ def test_a_take_down_is_written_and_read_everywhere(capsys, tmp_path, arch):
     assert (status, "the new plan is the old one" in said) == (0, True)
 
 
-@pytest.mark.parametrize(
-    "words", [PROPPED, pytest.param(CLOSE, marks=pytest.mark.slow)], ids=" ".join
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [PROPPED, CLOSE], ids=" ".join)
 def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, words):
     """Props that bear only so much, and a tolerance beside other limits; also planned again."""
     out, quick = tmp_path / "propped", "--no-stability"
@@ -167,8 +167,6 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, arch, aim):
 
 
 # parts of builds, replanning and the next move on the command line
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The folder of a plan."""
@@ -183,6 +181,7 @@ def folder(tmp_path_factory):
 FREE = ("--schedule", "free", "--no-stability")
 
 
+@pytest.mark.slow
 def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
     rest = tmp_path / "rest"
     scene = str(folder / "scene.json")
@@ -242,6 +241,7 @@ def test_a_state_is_a_plan_of_one_step(capsys, folder, tmp_path):
         assert said in err
 
 
+@pytest.mark.slow
 def test_the_rest_is_planned_anew(capsys, folder, tmp_path):
     quiet = ("--no-stability",)
     status, said, _ = run(capsys, "replan", str(folder), "--at", "3", *quiet)

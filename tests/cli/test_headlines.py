@@ -1,7 +1,5 @@
 """What people read first; commands of packages and users."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +9,7 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt._registry import ADDED, COMMANDS, every_command
+from seqopt._registry import COMMANDS, every_command
 from seqopt.errors import InfeasibleError, PluginWarning, ProblemError, StepError
 from seqopt.sequence.rules import FreeRules
 from tests.commands import command
@@ -98,8 +96,6 @@ def test_a_payload_that_is_enough_for_a_free_schedule(asked):
 
 
 # commands of packages and users: a function whose signature and docstring say its options
-
-
 def weigh(
     scene: str = "arch25", *, per: str = "scene", least: float = 0.0, names: tuple[str, ...] = ()
 ):
@@ -174,15 +170,6 @@ def test_a_package_that_fails_is_left_out(package, capsys):
         status, page, _ = command(capsys, "--help")
     assert (status, "weigh" in page) == (0, False)
     assert command(capsys, "scene", "chain:bricks=7")[2] == ""  # nobody asks for plug-ins there
-
-
-@pytest.fixture
-def alone():
-    """Forget what a test registers."""
-    before = {**ADDED}
-    yield
-    ADDED.clear()
-    ADDED.update(before)
 
 
 def count(

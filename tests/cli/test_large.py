@@ -1,7 +1,5 @@
 """Large problems from the command line; how a command ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -87,6 +85,7 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path):
     assert statuses == {0, 4}
 
 
+@pytest.mark.slow
 def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path):
     """As ctrl-C at the first finding; what is written is whole."""
     came = []
@@ -127,8 +126,6 @@ def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
 
 
 # how a command ends: one table of statuses, and never a traceback
-
-
 def shell(line):
     """A line of the shell, in which ``seqopt`` is this one."""
     program = f"{sys.executable} -W error -m seqopt"
@@ -217,6 +214,7 @@ def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, sai
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_program_has_a_status_that_no_answer_has():
     """Python ends with 1, which is the status of what does not hold."""
     program = """

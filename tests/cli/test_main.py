@@ -1,7 +1,5 @@
 """The command line as a user meets it; a step that is a mechanism is said to be one."""
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import replace
@@ -78,6 +76,7 @@ def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine25):
         assert (table[column] - values[column]).abs().max() <= close
 
 
+@pytest.mark.slow
 def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     words = ("--schedule", "two-robot", "--robots", "rob3,rob1", "--formulation", "overlap_dp")
     status, _, err = run(capsys, "optimize", *words, "--no-stability", "--out", str(tmp_path))
@@ -150,6 +149,7 @@ def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path
     assert pd.read_csv(out)["finding"].notna().any()
 
 
+@pytest.mark.slow
 def test_a_time_limit_ends_a_search_whose_choices_are_in_a_trace(tmp_path, capsys):
     words = ("--formulation", "labels", "--budget", "travel=0.9", "--no-stability")
     words = (*words, "--out", str(tmp_path / "a"))
@@ -186,8 +186,6 @@ def test_a_comparison_with_speed(tmp_path, capsys):
 
 
 # a step that is a mechanism is said to be one, beside the steps that are none
-
-
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 DRY = ("--engine", "discrete", "--mortar", "dry")
 
@@ -203,6 +201,7 @@ def first_steps(path, count):
     return path
 
 
+@pytest.mark.slow
 def test_what_flies_apart_is_no_displacement(capsys, tmp_path):
     """It was a displacement of 1,119 km, with the advice of stiffer joints, and status 0."""
     words = (ARCH, "--plan", first_steps(tmp_path / "plan.csv", 3))

@@ -1,7 +1,5 @@
 """Help; what a person sees."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import os

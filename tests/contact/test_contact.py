@@ -1,7 +1,5 @@
 """Assemblies and mortars, faces and joints: what they are, and one line where one is wrong."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product
@@ -105,8 +103,6 @@ def test_an_arch_with_thick_joints_says_so():
 
 
 # what is wrong with an assembly or a mortar is named
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -145,8 +141,6 @@ def test_a_mortar_is_as_strong_as_another_where_it_carries_all_of_it():
 
 
 # stress at the corners of a face
-
-
 def test_stress_at_the_corners_is_that_of_a_beam():
     """Force over area, moment over section modulus, twist over the polar second moment."""
     size = length, width, _ = (0.4, 0.3, 0.5)
@@ -163,8 +157,6 @@ def test_stress_at_the_corners_is_that_of_a_beam():
 
 
 # where the faces of bricks meet
-
-
 def test_bricks_touch_where_their_faces_overlap(arch25):
     """The paper's joints are 116 × 53 mm; tilted bricks meet a little off."""
     net = build_network(arch25)
@@ -190,8 +182,6 @@ def test_a_joint_beside_its_bricks_is_named(arch25):
 
 
 # points that stand for a face
-
-
 @pytest.mark.parametrize("size", [(1.0, 0.5, 0.2), (0.3, 0.9, 2.0)])
 def test_a_bed_has_the_moments_of_its_face(size):
     length, width, _ = size

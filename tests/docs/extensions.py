@@ -1,7 +1,5 @@
 """Extensions of the site, which are no package that is installed."""
 
-from __future__ import annotations
-
 import importlib.util
 
 from tests.docs.transcripts import DOCS

@@ -4,8 +4,6 @@ Counted is what stands in the main part of a page, navigation and equations' sou
 Words in sentences are those outside tables, code and its output.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 

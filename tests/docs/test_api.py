@@ -1,7 +1,5 @@
 """The API shows the door, what rooms hand out, and whatever a page of the site imports."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from importlib import import_module

@@ -1,7 +1,5 @@
 """The documentation: built strictly, tutorials executed; the README's commands are real."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
@@ -211,14 +209,6 @@ def test_readme_in_words_what_is_stored():
     assert f"of {round(1 / speed['fast_s_per_set'], -4):,.0f} three-grip sets a second" in text
     assert f"is {round(speed['ratio_median'], -2):,.0f} times as fast in the median" in text
     assert f"({round(speed['ratio_lowest'], -1):.0f} in the lowest)" in text
-
-
-def test_readme_python_runs(capsys):
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, flags=re.DOTALL)
-    assert len(blocks) == text.count("```python") == 2
-    exec(compile("".join(code for code, _ in blocks), "README", "exec"), {})
-    assert capsys.readouterr().out == "".join(shown for _, shown in blocks)
 
 
 QUICK = ("engines", "scenes")  # pages whose examples are among the quick tests

@@ -1,7 +1,5 @@
 """The component of the Grasshopper page, without Rhino: blocks, a plan, and its steps."""
 
-from __future__ import annotations
-
 import runpy
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """Pages are true and whole: what they run, show, offer and refer to."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -29,7 +27,7 @@ print("figures shown:", counts, "left:", len(plt.get_fignums()))
 """
 
 
-RUN = ("adding_formulation", "own_format")  # the same cells are executed when the site is built
+RUN = ("own_format",)  # the same cells are executed when the site is built
 
 
 def told():

@@ -1,7 +1,5 @@
 """Phrases that newcomers stumbled over stay out of pages; what a forge and a maintainer find."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re
@@ -93,8 +91,6 @@ def test_phrases_in_code_are_not_prose():
 
 
 # what a forge and a maintainer find: workflows, hooks, templates, one version
-
-
 WORKFLOW = ROOT / ".github" / "workflows" / "tests.yml"
 
 

@@ -4,8 +4,6 @@
 changes before it is kept.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import io

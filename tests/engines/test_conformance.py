@@ -1,25 +1,47 @@
-"""What every engine does with what it is asked: conformance to the interface."""
+"""Every engine keeps the interface, and says what is loose."""
 
-from __future__ import annotations
-
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from experiments.harness.scenes import grip_sets
 from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar, find_elastic_limits
+from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Want
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES, REASONS, AutoEngine
+from seqopt.engines.rigid import _refinement as refinement
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mixed import require_resistance, solve_mixed
+from seqopt.engines.rigid._operator import OperatorBuilder, grip_forces, well_conditioned
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import GripError, MechanismError, SceneError
+from seqopt.errors import GripError, MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import sequential
 from seqopt.study import STUDY_BED
-from tests.builders import from_both_sides, largest_difference, running_bond, six_bricks
+from tests.builders import (
+    all_nodes,
+    block,
+    branch,
+    from_both_sides,
+    hinged,
+    largest_difference,
+    on_soft_ground,
+    running_bond,
+    six_bricks,
+    small_arch,
+    solve_batch,
+    torsion_free,
+)
+from tests.direct_solve import solve_dense
+from tests.limit_scenes import chain
+from tests.reference_chain import solve_exactly
 
 
 @pytest.fixture(params=ENGINES)
@@ -126,8 +148,6 @@ def test_ends_come_in_the_scenes_order(name):
 
 
 # discrete elements on beds of springs of their own
-
-
 def test_beds_alone_are_other_joints():
     net = build_network(load_scene("arch25"))
     own, study = DiscreteEngine(net), DiscreteEngine(net, bed=STUDY_BED)
@@ -179,8 +199,6 @@ def test_soft_joints_that_hold_are_no_mechanism_however_far_they_give():
 
 
 # the cheapest level that is enough is taken, and counted
-
-
 def test_the_cheapest_level_is_taken_and_counted():
     net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4, 0.0], pattern="V")))
     engine, sets = AutoEngine(net), np.array([[7], [1]])
@@ -217,3 +235,293 @@ def test_levels_join_where_a_joint_has_no_stiffness(mortar):
     exact = ComplianceEngine(net).solve(2, np.array([[2, 4], [4, 2], [3, 5]]), Want.RESPONSES)
     assert found.displacement.shape == exact.displacement.shape
     assert np.isfinite(found.displacement).all()
+
+
+# what is loose, nearly loose or badly held is answered for many grip sets together
+NONE = np.zeros((1, 0), dtype=int)
+TWISTED = 12  # the joint of arch25 that acts from 14 bricks on
+
+
+def apart(fields, others):
+    """The largest difference of each set and field, relative to its largest entry."""
+    worst = 0.0
+    for name in _NAMES:
+        a, b = (getattr(f, name).reshape(len(f.grip_force), -1) for f in (fields, others))
+        size = np.abs(b).max(axis=1, initial=1e-300)
+        worst = max(worst, (np.abs(a - b).max(axis=1, initial=0) / size).max())
+    return worst
+
+
+@pytest.fixture
+def together(monkeypatch):
+    """Forbid what looks at grip sets one by one."""
+
+    def one_by_one(*_):
+        raise AssertionError("a grip set was looked at on its own")
+
+    monkeypatch.setattr(refinement, "solve_mixed", one_by_one)
+    monkeypatch.setattr(refinement, "require_resistance", one_by_one)
+
+
+# a loose joint, an island
+def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monkeypatch):
+    monkeypatch.setattr(refinement, "Refinement", None)  # nothing is corrected
+    engine = ComplianceEngine(build_network(torsion_free(arch25, TWISTED)))
+    for bricks in (1, 7, TWISTED + 1):
+        sets = grip_sets(engine.network, bricks, 20) if bricks > 1 else NONE
+        mine, whole = (e.solve(bricks, sets, Want.ALL) for e in (engine, engine25))
+        assert apart(mine, whole) <= 1e-12
+    with pytest.raises(TypeError):
+        engine.solve(TWISTED + 2, NONE)
+
+
+@pytest.mark.parametrize(("kind", "bricks"), [("hinge", 14), ("island", 14), ("island", 25)])
+def test_sets_together_agree_with_sets_on_their_own(arch25, kind, bricks):
+    """Every set that is a mechanism is called one, every other one answered alike."""
+    scene = {
+        "hinge": hinged(arch25, 3),
+        "island": replace(arch25, joints=arch25.joints[:11] + arch25.joints[12:]),
+    }[kind]
+    net = build_network(scene)
+    engine, sound = ComplianceEngine(net), []
+    sets = [*grip_sets(net, bricks, 25), (21, 24, 26), (24, 26, 27), (25, 26, 27)]
+    for grips in sets:
+        row = grip_columns(net, bricks, [grips])
+        try:
+            require_resistance(net, bricks, row[0])
+            solve_mixed(net, bricks, row)
+        except MechanismError:
+            with pytest.raises(MechanismError):
+                engine.solve(bricks, [grips])
+        else:
+            sound.append(grips)
+    assert sound
+    alone = solve_mixed(net, bricks, grip_columns(net, bricks, sound))
+    assert apart(engine.solve(bricks, sound, Want.ALL), alone) <= 1e-9
+    assert bricks == 25 or len(sound) < len(sets)
+
+
+def test_an_unloaded_mechanism_is_found():
+    """Bricks in line beyond a torsion-free joint have no reason to turn, and nothing to stop them.
+
+    Grips on that line do not keep them either; one beside it does.
+    """
+    shape = ArchShape(pitch=np.full(4, 0.3), pattern="V", closed=False)
+    engine = ComplianceEngine(build_network(torsion_free(arch_scene(shape), 1)))
+    for grips in ([[]], [[7]], [[5, 6, 7]]):
+        with pytest.raises(MechanismError, match="nothing resists"):
+            engine.solve(4, np.array(grips, dtype=int).reshape(1, -1))
+    beside = replace(shape, pattern="VVVL")
+    engine = ComplianceEngine(build_network(torsion_free(arch_scene(beside), 1)))
+    assert np.isfinite(engine.solve(4, [[7]]).displacement).all()
+
+
+def test_a_scene_that_is_loose_from_its_first_brick():
+    """Ground that does not resist turning: no operator at any brick count."""
+    scene = on_soft_ground(six_bricks(), 0.0)
+    net = build_network(scene)
+    assert len(grow_tree(net).spring) == 0
+    engine = ComplianceEngine(net)
+    for bricks, grips in ((1, []), (3, [3])):
+        with pytest.raises(MechanismError):
+            engine.solve(bricks, np.array(grips, dtype=int).reshape(1, -1))
+    sets = [(3, 5), (2, 9), (11, 6)]
+    alone = solve_mixed(net, 6, grip_columns(net, 6, sets))
+    assert apart(engine.solve(6, sets, Want.ALL), alone) <= 1e-9
+
+
+# grip sets that the operator alone does not answer well enough
+@pytest.mark.parametrize("count", [75])
+def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
+    net = build_network(chain(count))
+    tip = 2 * count - 1
+    sets = [(tip, tip - 1, tip - 2), (tip, tip - 2, tip - 4), (tip - 1, tip - 2, tip - 3)]
+    engine = ComplianceEngine(net)
+    columns = grip_columns(net, count, sets)
+    _, trusted = solve_batch(engine._operator(count, columns), columns)
+    assert not trusted.any()
+    fields = engine.solve(count, sets, Want.ALL)
+    for row, places in enumerate(columns):
+        exact = solve_exactly(net, count, places)
+        moved = fields.displacement[row, net.inner.ravel()]
+        assert np.abs(moved - exact.displacement).max() <= 1e-12 * np.abs(exact.displacement).max()
+
+
+# every brick held at both nodes
+@pytest.mark.parametrize("bricks", [1, 6])
+def test_every_brick_held_at_both_nodes(bricks):
+    """Nothing moves and no joint carries: sound, however rounding compares with itself."""
+    scene = replace(six_bricks(), blocked_nodes=())
+    net = build_network(scene)
+    for held in (net, build_network(hinged(scene, 2))):
+        sets = all_nodes(held, bricks)
+        columns = grip_columns(held, bricks, sets)
+        answers = [
+            solve_mixed(net, bricks, columns),
+            ComplianceEngine(held).solve(bricks, sets, Want.ALL),
+            FrameEngine(held).solve(bricks, sets),
+        ]
+        weight = np.linalg.norm(net.weight[:bricks], axis=1).sum()
+        for fields in answers:
+            assert fields.grip_force.sum(axis=(0, 1)) == pytest.approx([0, 0, weight], abs=1e-9)
+            assert np.abs(fields.joint_wrench).max() <= 1e-9 * weight
+            assert np.abs(fields.displacement).max() <= 1e-12
+        for source in (held, ComplianceEngine(held), FrameEngine(held)):
+            assert diagnose(source, bricks, sets[0]).finding is Finding.SOLVED_WELL
+
+
+# soft ground
+@pytest.mark.parametrize("turning", [1e-2, 1e-9])
+@pytest.mark.parametrize("grips", [(), (10, 17)])
+def test_soft_ground_is_no_mechanism(arch25, turning, grips):
+    """It is answered well, or refused as too much for double precision, by every route."""
+    net = build_network(on_soft_ground(arch25, turning))
+    columns = grip_columns(net, 10, np.array([grips], dtype=int).reshape(1, -1))
+    require_resistance(net, 10, columns[0])
+    for source in (net, ComplianceEngine(net), FrameEngine(net)):
+        assert diagnose(source, 10, grips).finding is not Finding.MECHANISM
+    for solve in (ComplianceEngine(net).solve, FrameEngine(net).solve):
+        with suppress(SolverError) if len(grips) < 2 else nullcontext():
+            solve(10, np.array([grips], dtype=int).reshape(1, -1))
+    with suppress(SolverError):
+        solve_dense(net, 10, columns)
+
+
+def test_ground_that_does_not_resist_is_a_mechanism(arch25):
+    """Negative control: the same without any stiffness."""
+    net = build_network(on_soft_ground(arch25, 0.0))
+    for engine in (ComplianceEngine(net), FrameEngine(net)):
+        with pytest.raises(MechanismError):
+            engine.solve(3, [[4]])
+        assert diagnose(engine, 3, [4]).finding is Finding.MECHANISM
+
+
+def test_a_single_brick_on_soft_ground_is_answered():
+    """The weight over the softness: 2.4e-6 N m/rad against an arm of a tenth of a meter."""
+    net = build_network(block(lean=0.3, rotational_stiffness=(2.4e-6, 2.4e-6, 2.4e-6)))
+    twist = ComplianceEngine(net).solve(1, NONE, Want.BRICKS).brick_twist[0, 0]
+    arm = net.centroid[0] - net.springs.position[0]
+    assert twist[3:] == pytest.approx(np.cross(arm, net.weight[0]) / 2.4e-6, rel=1e-9, abs=1e-3)
+
+
+# the compliance operator and its grips' equations against solving each structure directly
+SCENES = {
+    "arch": small_arch(5),
+    "wall": running_bond(3, 3),
+    "both sides": from_both_sides(6, "VLR"),
+    "branch": branch(),
+}
+
+
+def unequal(scene):
+    """The scene with joints of which no two are alike, in no two directions."""
+    joints = [
+        replace(
+            joint,
+            translational_stiffness=(1e8 + 1e6 * i, 2e8 + 3e6 * i, 5e8),
+            rotational_stiffness=(1e6 + 1e4 * i, 3e6, 4e6 + 2e4 * i),
+        )
+        for i, joint in enumerate(scene.joints)
+    ]
+    return replace(scene, joints=tuple(joints))
+
+
+def free_nodes(scene, bricks):
+    nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+    return [node for node in nodes if node not in scene.blocked_nodes]
+
+
+def sets_of(scene, bricks, grips, count=4):
+    """Sets of free nodes, among them those of the last bricks, where two share a brick."""
+    free = free_nodes(scene, bricks)
+    rng = np.random.default_rng(10 * bricks + grips)
+    drawn = [rng.choice(free, grips, replace=False) for _ in range(count)]
+    return np.array([*drawn, free[:grips], free[-grips:]]) if grips else np.zeros((1, 0), int)
+
+
+@pytest.mark.parametrize("grips", [0, 2, 4])
+@pytest.mark.parametrize("name", SCENES)
+def test_every_field_is_that_of_a_direct_solve(name, grips):
+    """At every brick count: what closes loops is there or not, ends carry or do not yet."""
+    scene = unequal(SCENES[name])
+    net = build_network(scene)
+    builder = OperatorBuilder(net, grow_tree(net))
+    for bricks in range(1, len(scene.bricks) + 1):
+        if len(free_nodes(scene, bricks)) < grips:
+            continue
+        columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
+        fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
+        direct = solve_dense(net, bricks, columns)
+        assert trusted.all()
+        for field in _NAMES:
+            own, other = getattr(fields, field), getattr(direct, field)
+            unit = 1e-8 if field in ("displacement", "brick_twist") else 1.0  # what 1 N moves
+            gap = np.abs(own - other).max(initial=0)
+            assert gap <= 1e-9 * np.abs(other).max(initial=unit), (bricks, field)
+
+
+def test_only_what_is_wanted_is_computed():
+    net = build_network(small_arch(5))
+    engine = ComplianceEngine(net)
+    whole = engine.solve(5, [[3, 7]], Want.ALL)
+    fields = {
+        Want.EDGES: "edge_force",
+        Want.DISPLACEMENTS: "displacement",
+        Want.SUPPORT: "support",
+        Want.JOINTS: "joint_wrench",
+        Want.BRICKS: "brick_twist",
+    }
+    for want in fields:
+        part = engine.solve(5, [[3, 7]], want)
+        same(part.grip_force, whole.grip_force)
+        for other, name in fields.items():
+            if other is want:
+                same(getattr(part, name), getattr(whole, name))
+            else:
+                assert getattr(part, name).shape[1] == 0
+
+
+def same(part, whole):
+    np.testing.assert_allclose(part, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
+
+
+def eliminated(matrix):
+    """The pivots of a matrix, from the first unknown to the last."""
+    left, pivots = matrix.copy(), []
+    while len(left):
+        pivots.append(left[0, 0])
+        left = left[1:, 1:] - np.outer(left[1:, 0], left[0, 1:]) / left[0, 0]
+    return np.array(pivots)
+
+
+@pytest.mark.parametrize("grips", [(3,), (2, 7, 9)])
+def test_what_rounding_may_change_grips_forces_by(grips):
+    """Of each displacement the digits that are lost, over what is left to tell the force by."""
+    net = build_network(unequal(small_arch(5)))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
+    rng = np.random.default_rng(0)
+    operator = replace(operator, loss=rng.uniform(1.0, 9.0, len(operator.loss)))
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    found = grip_forces(operator, columns, index)
+    part, loss = operator.flexibility[np.ix_(index[0], index[0])], operator.loss[index[0]]
+    own, size, dead = (
+        np.diag(part),
+        np.abs(found.force[0]),
+        np.abs(operator.dead_displacement[index[0]]),
+    )
+    left = eliminated(part)
+    sums = [
+        sum(np.sqrt(own[i] * loss[i] * own[j] * loss[j]) * size[j] for j in range(len(own)))
+        + dead[i] * loss[i]
+        for i in range(len(own))
+    ]
+    doubt = (sums / left).max() / size.max()
+    assert found.lowest == pytest.approx([(left / own).min()], rel=1e-9)
+    for most, stands in ((doubt * (1 - 1e-9), False), (doubt * (1 + 1e-9), True)):
+        assert well_conditioned(operator.doubts, index, found, most).tolist() == [stands]
+    for lowest in (-1.0, 0.0, np.nan):  # not definite: nothing is known of the error
+        pivot = found.pivot.copy()
+        pivot[-1] = lowest
+        found = found._replace(pivot=pivot)
+        assert not well_conditioned(operator.doubts, index, found, 1e300).any()

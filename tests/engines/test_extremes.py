@@ -1,7 +1,5 @@
 """Extremes of fields without the fields; grips that are not where they should be."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace
@@ -170,8 +168,6 @@ def test_without_numba_fields_answer(monkeypatch):
 
 
 # bLAS keeps to one thread inside engines, and to its own number outside
-
-
 def threads():
     """How many threads NumPy's and SciPy's linear algebra use; others may know but one."""
     found = [lib for lib in threadpool_info() if lib["user_api"] == "blas"]
@@ -214,8 +210,6 @@ def test_engines_keep_to_one_thread(two_threads, monkeypatch, owner, name, loose
 
 
 # grips that are not where they should be
-
-
 SETS = [[3, 8, 11], [4, 5, 9]]  # two hold one brick in the second
 
 

@@ -1,7 +1,5 @@
 """Grips that give way, against a dense solver of rigid bodies that are held by springs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -191,8 +189,6 @@ def test_some_are_rigid(arch25, ways, grips):
 
 
 # the rigid limit
-
-
 @pytest.mark.parametrize("grips", [(3, 20, 33), (34, 35), (22, 23, 46, 47)])
 def test_what_softness_changes_falls_as_it_does(arch25, grips):
     """In proportion to 1/k down to 1e15 N/m.
@@ -245,8 +241,6 @@ def test_moving_two_apart_pulls_at_both(arch25):
 
 
 # what is asked, and refused
-
-
 def test_turning_is_a_hold_of_its_own():
     """One grip that lets nothing turn holds a brick that two others leave turning."""
     scene = replace(six_bricks("V"), joints=())
@@ -291,8 +285,6 @@ def test_wrong_stiffness_is_a_line(given, named):
 
 
 # grips that give way as the joints of an arm do: full compliances against a dense solver
-
-
 @pytest.mark.parametrize("turn", [None, 1e5])
 @pytest.mark.parametrize("grips", [(3, 8, 11), (4, 5, 9)])
 def test_engines_agree_with_joints(grips, turn):

@@ -1,7 +1,5 @@
 """Formats of others: registered by name, offered beside those that are there."""
 
-from __future__ import annotations
-
 import copy
 import json
 from dataclasses import replace
@@ -14,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt._registry import ADDED
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError
 from seqopt.exchange import Content, FileBlock, Format, export, import_scene
 from seqopt.exchange._building import build_scene
@@ -27,16 +24,9 @@ from seqopt.sequence.steps import Step, StepKind
 from tests.builders import running_bond
 from tests.documents import DOCUMENTS as OTHERS
 
+pytestmark = pytest.mark.usefixtures("alone")
+
 GIVEN = Given(density=2000.0)
-
-
-@pytest.fixture(autouse=True)
-def alone():
-    """Forget what a test registers."""
-    before = {**ADDED}
-    yield
-    ADDED.clear()
-    ADDED.update(before)
 
 
 def read(path):
@@ -85,8 +75,6 @@ def test_names_that_are_taken_are_refused_by_kind():
 
 
 # what a scene loses that goes out and is read again: each format says all of it
-
-
 ENDS = {"obj": "obj"}
 
 
@@ -152,8 +140,6 @@ def test_every_format_that_goes_both_ways_says_what_it_loses():
 
 
 # documents with something in the wrong place: a scene, or one line; never anything else
-
-
 JUNK = (None, True, -1, 0, 3, 1e308, -1e-300, 10**400, "", "x", [], {}, [[1]], {"data": 1}, [0] * 3)
 
 
@@ -166,12 +152,9 @@ def places(held, before=()):
         yield from places(value, (*before, key))
 
 
-def by_compas():
-    """A document that COMPAS writes: a dictionary of shapes."""
-    return {"meshes of compas": json.loads(compas.json_dumps({"a": Box(1), "b": [Box(1)]}))}
-
-
-DOCUMENTS = OTHERS | by_compas()
+DOCUMENTS = OTHERS | {
+    "meshes of compas": json.loads(compas.json_dumps({"a": Box(1), "b": [Box(1)]}))
+}
 PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
 REMOVED = "removed"
 

@@ -1,7 +1,5 @@
 """Tasks of robots; plans go into the formats of others; blocks that interpenetrate."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -165,8 +163,6 @@ def test_postures_are_written_where_they_are_given():
 
 
 # plans go into the formats of others, and folders of plans are read again
-
-
 @pytest.fixture
 def sources(tmp_path):
     """Write documents; return the scenes that they become."""
@@ -212,8 +208,6 @@ def test_what_does_not_fit_is_refused(sources, tmp_path):
 
 
 # blocks that interpenetrate, or stand there twice, are named and never pass in silence
-
-
 BRICK = (0.2, 0.1, 0.06)
 
 

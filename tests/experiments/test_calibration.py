@@ -1,7 +1,5 @@
 """Vault tests: closed forms, reciprocity, two routes to one stiffness, and what must fail."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -92,10 +90,6 @@ def test_a_fit_finds_the_stiffnesses_that_made_the_data():
         assert fit(laws(tests)[BED], measure, ALL) == pytest.approx(pair, rel=1e-3)
 
 
-def stored(name):
-    return pd.read_csv(RESULTS / f"calibration_{name}.csv")
-
-
 def test_what_is_left_of_the_lead():
     """Figures that an independent model gave: the lead is in what was minimized."""
     beside = comparison(MODELS).set_index("what")
@@ -110,7 +104,7 @@ def test_what_is_left_of_the_lead():
         assert beside.loc[what].to_numpy() == pytest.approx(pair, abs=0.051), what
     gain = beside.loc[[GAIN, "standard error of that"], "bed_percent"].to_numpy()
     assert gain == pytest.approx((4.4, 9.4), abs=0.051)
-    again = stored("comparison").set_index("what")
+    again = pd.read_csv(RESULTS / "calibration_comparison.csv").set_index("what")
     assert beside["bed_percent"].to_numpy() == pytest.approx(again["bed_percent"].to_numpy(), 1e-3)
     rows = pd.read_csv(RESULTS / "calibration.csv")
     rows = rows[(rows["law"] == BED) & (rows["measure"] == "absolute")]

@@ -1,7 +1,5 @@
 """Claims; counterparts of the paper's figures and tables."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -163,8 +161,6 @@ def test_a_formulation_is_limited_in_memory_and_ended_in_time():
 
 
 # counterparts of the paper's figures and tables: none is missing, the page says what is stored
-
-
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
 PAGE = (ROOT / "docs" / "counterparts.md").read_text(encoding="utf-8")
 WITH_NUMBERS = [item for item in ITEMS if item.numbers]

@@ -1,7 +1,5 @@
 """Every claim's check passes on the rows that are stored, and fails on rows that are spoiled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

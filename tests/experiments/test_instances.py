@@ -1,7 +1,5 @@
 """The library of instances: made again as it is, and what is known of each is judged."""
 
-from __future__ import annotations
-
 import pytest
 
 import seqopt

@@ -1,7 +1,5 @@
 """Names in CSV files are no formulas for spreadsheets, and come back as they were."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

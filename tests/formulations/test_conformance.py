@@ -1,9 +1,8 @@
 """Conformance; what exact formulations share."""
 
-from __future__ import annotations
-
 import signal
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import entry_points
 from itertools import pairwise
 
@@ -191,11 +190,16 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
         assert worth == pytest.approx(best, abs=1e-6)
 
 
+@pytest.fixture(scope="module")
+def compiled():
+    """Instances of problems, once for all formulations with an aim."""
+    return cache(lambda problem, aim: seqopt.compile_instance(problem, aim=aim))
+
+
 @timely
-def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
+def test_no_time_is_enough_for_an_allowed_choice(name, problem25, compiled):
     """Of costs that are known; where states are still to be visited there is no plan yet."""
-    one = seqopt.compile_instance(problem25, aim=ALL[name].aim)
-    plan = seqopt.solve(one, ALL[name], time_limit=0)
+    plan = seqopt.solve(compiled(problem25, ALL[name].aim), ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED
     if name in OURS:
         assert plan.certificate.gap < 0.3
@@ -321,8 +325,6 @@ def test_all_exact_ones_equal_brute_force_on_a_small_arch(criterion):
 
 
 # what exact formulations share: how programs are solved, read and bounded
-
-
 PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
 EXACT = PROGRAMS | {n: find_formulation(n) for n in ("overlap_dp", "overlap_lp", "minimax")}
 

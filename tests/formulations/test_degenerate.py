@@ -1,7 +1,5 @@
 """Degenerate placement problems against enumeration, and answers that are not what they claim."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 Forces count in the cube's weight, strengths in that weight over its face, so that they add up.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Conformance; a puzzle without bricks."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -88,15 +86,15 @@ def test_it_agrees_with_brute_force(name, aim, size):
 SYMMETRIC = with_robots(from_both_sides(2, "VL"), 2)  # its peaks are equal but for rounding
 
 
-@pytest.mark.parametrize("names", [("schedule_search",), pytest.param((*ALL,), marks=slow)])
+@slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @example(build=(SYMMETRIC, FreeRules(least_grips=0, newest="free")))
 @settings(max_examples=4)
-def test_they_agree_with_brute_force_under_any_rules(names, build):
+def test_they_agree_with_brute_force_under_any_rules(build):
     engine, rules = seqopt.make_engine("compliance", build[0]), build[1]
     for aim in ("minmax,steps", "regrips,sum", "steps,minmax"):
         best = best_values(engine, rules, aim)
-        for name in names:
+        for name in ALL:
             check(name, build_states(engine, rules, ONES, aim), best)
 
 
@@ -217,15 +215,7 @@ def test_a_plan_does_not_depend_on_who_solves_it():
     assert again.certificate.bounds == first.certificate.bounds
 
 
-@pytest.mark.slow
-def test_processes_of_our_own_give_the_same_and_end():
-    first, again = solved(), solved(workers=2)
-    assert (again.steps, again.objective) == (first.steps, first.objective)
-
-
 # a puzzle without bricks, as a graph and a space: formulations solve it, the judge proves it
-
-
 JUGS, WANTED = (5, 3), 4  # liters that jugs hold, and liters to be measured
 EVERY = formulations("goals", "instance")
 SUMS = [name for name, f in EVERY.items() if f.aim is not Aim.PEAK]

@@ -3,8 +3,6 @@
 However plans are found: only a search that looked at everything says that there is none.
 """
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 from functools import cache
@@ -88,13 +86,10 @@ def test_states_have_a_plan_within_every_optimum(bricks, moves, name, formulatio
     check(posed(bricks, moves), name, formulation)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "formulation"),
-    [
-        ("regrips", "order_search"),
-        pytest.param("steps", "path_beam", marks=slow),
-        pytest.param("travel", "order_search", marks=slow),
-    ],
+    [("regrips", "order_search"), ("steps", "path_beam"), ("travel", "order_search")],
 )
 def test_orders_have_a_plan_within_every_optimum(name, formulation):
     check(posed(3, UP, "tied"), name, formulation)
@@ -133,6 +128,7 @@ def test_pairs_of_optima_have_the_plans_that_they_are_of():
         assert all(plan.objective[n] <= factor * v * (1 + 1e-6) for n, v in one.items())
 
 
+@pytest.mark.slow
 def test_a_narrow_search_finds_none_and_says_no_more():
     """The states of least worst step have no plan within the budget; others have."""
     problem = posed(6, UP)
@@ -159,8 +155,6 @@ def test_a_narrow_search_finds_none_and_says_no_more():
 
 
 # the free schedule and its Pareto sets against brute force on small builds, and on the arch
-
-
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @settings(max_examples=6, deadline=None)
@@ -243,6 +237,7 @@ def pose_goals(text):
     return build_states(engine, FreeRules(), ONES, text).goals
 
 
+@pytest.mark.slow
 def test_all_states_of_the_arch_are_counted(arch):
     assert explore(arch).graph().graph.states == 71035  # start and end among them
 

@@ -1,7 +1,5 @@
 """The formulation on the page on writing one is short, and passes what the page recommends."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

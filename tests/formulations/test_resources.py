@@ -1,7 +1,5 @@
 """A resource of one's own, on a loop and on a free schedule: found, judged, and claimed alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 
@@ -188,8 +186,6 @@ def test_a_function_that_fails_is_named(extend):
 
 
 # what the search gets wrong about it, the judge sees
-
-
 def is_refused(problem):
     try:
         plan = seqopt.solve(problem)
@@ -211,9 +207,8 @@ def test_a_label_that_is_let_through_is_seen(space):
     assert is_refused(posed(space).but(limits=[wrong]))
 
 
-@pytest.mark.parametrize(
-    "space", ["loop", *(pytest.param(s, marks=pytest.mark.slow) for s in ("free", "sum"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("space", ["loop", "free", "sum"])
 def test_a_label_that_is_left_out_is_missed(space):
     """Whatever label of the best plan: a plan as good is found, or the judge finds a better."""
     plan = seqopt.solve(posed(space).but(limits=[heat(space)]))

@@ -1,7 +1,5 @@
 """States of schedules with open grips, one to four a step: all aims against brute force."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache

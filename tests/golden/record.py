@@ -4,8 +4,6 @@
 is meant, and list old and new values in the changelog.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import sys
@@ -22,11 +20,11 @@ WORST = "--criterion worst-ratio-published"
 FREE = "optimize arch25 --schedule free"
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 QUICK = {
-    "loop, ranks": "optimize arch25",
     "free, ratios": f"{FREE} --aim minmax,steps",
     "free, wall": "optimize wall:columns=4,courses=3 --schedule free --aim minmax,steps",
 }
 SLOW = {
+    "loop, ranks": "optimize arch25",
     "loop, budget of travel": "optimize arch25 --budget travel=16m",
     "loop, ranks, cascade": "optimize arch25 --formulation cascade",
     "loop, ratios, layers": f"optimize arch25 {WORST}",

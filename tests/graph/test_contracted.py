@@ -1,7 +1,5 @@
 """Graphs of decisions, with the forced moves behind each, against the whole graphs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

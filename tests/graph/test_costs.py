@@ -1,7 +1,5 @@
 """Costs and budgets as arrays; paths."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import networkx as nx

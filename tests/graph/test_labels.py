@@ -1,7 +1,5 @@
 """Searches of labels and of states that pass; ranks over all pairs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -137,8 +135,6 @@ def test_a_cut_is_found_without_asking_what_lies_before_it():
 
 
 # ranks over all pairs, and given the choice before
-
-
 CONDITIONAL = replace(EQUATIONS, ranked=Ranked.CONDITIONAL)
 values = st.one_of(st.integers(0, 4).map(float), st.just(np.nan))
 

@@ -1,7 +1,5 @@
 """What is proven of budgets; proofs are as strong as they promise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from heapq import heappop, heappush
@@ -121,13 +119,13 @@ def exactly_within(problem):
     }
 
 
-@pytest.mark.parametrize("draws", [12, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TAKERS)
-def test_none_is_within_only_where_enumeration_finds_none(name, draws):
+def test_none_is_within_only_where_enumeration_finds_none(name):
     """Prices may rise without end where costs tie; rounding must not decide what is possible."""
     rng = np.random.default_rng(1)
     refused = 0
-    for _ in range(draws):
+    for _ in range(60):
         problem = tied(rng)
         found = exactly_within(problem)
         try:
@@ -213,8 +211,6 @@ def test_labels_prove_only_what_all_of_them_close(monkeypatch):
 
 
 # proofs are as strong as they promise: one that looks at less, or allows more, is noticed
-
-
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 FREE_RULES = FreeRules()
 
@@ -294,6 +290,7 @@ def test_no_step_lowers_the_steps_to_go_by_more_than_one(direction, ending):
     assert (bound == fewest).mean() > 0.05
 
 
+@pytest.mark.slow
 def test_fewer_steps_are_proven_by_states_on_paths_of_fewer_steps():
     """A plan of more steps, or a bound that is too high, is refused by them as by all states."""
     problem = posed("minmax,steps", count=6)

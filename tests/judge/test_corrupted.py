@@ -4,8 +4,6 @@ Of amounts a constant is added, or another column is taken. A filter lets a stat
 one out of the best plan. Without a corruption the same questions are answered and proven.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 
@@ -87,11 +85,9 @@ def is_refused(problem):
 SHIFTS = {"bond": (1e3,), "friction": (-0.1, 0.1)}
 MARGINS = [(space, name) for space in SPACES for name in SHIFTS][:-1]  # the last one takes long
 PLAIN = [(s, a) for s in SPACES for a in AMOUNTS if s != "loop" or a not in ("steps", "regrips")]
-PLAIN = [each for each in PLAIN if each[1] not in ("bond", "friction")]
-
-
 ALIKE = ("C_max", "D_max", "F_largest", "sum(F_largest)")  # responses as T_max and M_sup
-DAILY = {("orders", "minmax"), ("free", "bond")}
+PLAIN = [(s, a) for s, a in PLAIN if a not in (*SHIFTS, *(() if s == "free" else ALIKE))]
+DAILY = {("orders", "minmax")}
 LOOP = ("minmax", "travel", "held")  # of the free schedule more are seen every day
 
 
@@ -141,8 +137,6 @@ def test_every_amount_is_attacked():
 
 
 # filters: each decides a question, is then forgotten, or refuses one state of the best plan
-
-
 FREE_NODE = {"loop": 3, "free": 6, "orders": 3}  # that best plans hold
 TOTAL = "sum(F_largest)"  # of which there are few plans as good
 STANDS = {"loop": "bond=3500", "free": "dry", "orders": "dry"}
@@ -287,8 +281,6 @@ def test_a_state_that_is_left_out_is_missed(space, kind, monkeypatch):
 
 
 # candidates of open grips, whose ranks are those among all of them
-
-
 RANKS = replace(seqopt.CRITERIA["equations-2-3"], name="ranks")
 
 
@@ -346,6 +338,7 @@ def test_ranks_without_a_candidate_are_seen(level, monkeypatch):
     assert is_refused(replace(ranked()))
 
 
+@pytest.mark.slow
 def test_a_candidate_that_is_left_out_is_missed(monkeypatch):
     """Whichever of the best plan: a plan as good is found, or the judge finds a better."""
     value, met = best_ranked().certificate.values[0], 0
@@ -371,8 +364,6 @@ def test_a_candidate_that_is_let_through_is_seen(monkeypatch):
 
 
 # robots' readiness, the resource of makespans: what depends on the path so far
-
-
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 

@@ -1,7 +1,5 @@
 """What judges free schedules and Pareto sets sees what is wrong; the judge is attacked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial, wraps
 
@@ -25,6 +23,7 @@ from tests.builders import small_arch
 PAIR = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 
+@pytest.mark.slow
 def test_weights_of_scenarios_that_prove_little_leave_a_gap():
     """Wrong weights are no error, but prove less; a wrong total, or none for a scenario, is one."""
     scene = small_arch(5)
@@ -86,8 +85,6 @@ def test_without_a_proof_nothing_is_said():
 
 
 # the judge is attacked: lies of every kind are refused or not believed, on every kind of problem
-
-
 HELD = FreeRules(ending="held")
 TIMES = "fetch=30,place=10,approach=10,grip=5,release=5"
 

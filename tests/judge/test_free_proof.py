@@ -1,7 +1,5 @@
 """The proof of free schedules; what a formulation claims is recomputed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -109,8 +107,6 @@ def test_the_models_of_a_proof_are_those_that_engines_solved(count):
 
 
 # what a formulation claims is recomputed: false answers, broken promises, bounds
-
-
 HEURISTIC, EXACT = FormulationKind.HEURISTIC, FormulationKind.EXACT
 
 
@@ -118,6 +114,7 @@ def bounded(bound):
     return lambda s: replace(s, bound=(bound(s.objective[0]),))
 
 
+@pytest.mark.slow
 def test_promises_are_held(problem25):
     """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
     cascade = find_formulation("cascade")

@@ -1,7 +1,5 @@
 """Laws every engine obeys; laws of the free schedule; units and scale change no choice."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -118,8 +116,6 @@ def test_a_worse_optimum_is_seen():
 
 
 # units and scale change no rank, no choice and no verdict
-
-
 UNITS = [(1e3, 1e-3, 1e3), (1e3, 1, 1), (1e-3, 1e3, 1e-3), (1e-3, 1, 1)]
 CASES = [(criterion, scales) for criterion in (EQUATIONS, CLOSEST) for scales in UNITS]
 

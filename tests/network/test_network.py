@@ -1,7 +1,5 @@
 """The double-cross network: counts, numbers, presence."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from unittest.mock import patch

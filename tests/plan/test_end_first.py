@@ -1,7 +1,5 @@
 """States that every plan passes are asked before any plan is sought; formulations of schedules."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -55,6 +53,7 @@ def test_that_the_whole_falls_is_known_before_a_plan_is_sought():
     assert not Proof(calm).is_impossible()
 
 
+@pytest.mark.slow
 def test_all_orders_and_fronts_end_in_it_too():
     problem = windy(0.6, bricks=4)
     with pytest.raises(InfeasibleError, match=END):
@@ -63,6 +62,7 @@ def test_all_orders_and_fronts_end_in_it_too():
         find_front(FrontProblem(problem, None))
 
 
+@pytest.mark.slow
 def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
     """In the loop of three robots two steps have none; a storm is more than robots hold."""
     network = seqopt.build_network(replace(seqopt.load_scene("arch25"), wind=(0.0, 30.0, 0.0)))
@@ -101,8 +101,6 @@ def test_where_it_says_that_no_plan_is_there_is_none(build, limit):
 
 
 # formulations of schedules, orders and fronts: what they change, return, raise and deny
-
-
 RULES = FreeRules(least_grips=1)
 
 

@@ -1,7 +1,5 @@
 """A problem as a flow; plans of robots that give way."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import permutations
 
@@ -93,8 +91,6 @@ def test_a_program_that_is_too_large_says_its_size(monkeypatch):
 
 
 # pareto sets over all build orders, against the sets of every order on its own
-
-
 AIMS = ["T_max,F_largest", pytest.param("D_max,steps", marks=pytest.mark.slow)]
 RULES = seqopt.FreeRules()
 
@@ -158,6 +154,7 @@ def short_of_one(problem, **options):
     return found[1:]
 
 
+@pytest.mark.slow
 def test_a_missing_point_is_seen():
     lacking = replace(find_formulation("pareto_zones"), name="lacking", solve=short_of_one)
     with pytest.raises(SolverError, match="the set lacks a point below"):
@@ -181,8 +178,6 @@ def test_what_does_not_fit_is_one_line(monkeypatch):
 
 
 # plans of robots that give way: who holds which node counts, and how much each gives
-
-
 STIFF = (1e7, 1e5, 3e6)
 
 

@@ -1,7 +1,5 @@
 """The linear range as a limit of plans; one way from a problem."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass, replace
@@ -198,6 +196,7 @@ def test_the_judge_finds_by_itself_that_steps_leave_the_range():
         judge_schedule(graph_of(problem.but(limits=[HARD])), free.selection, free.steps)
 
 
+@pytest.mark.slow
 def test_a_pareto_set_keeps_it():
     words = KINDS["free"][0]
     problem = posed(between(words, None), goals="F_largest,T_max", ending="held")
@@ -231,8 +230,6 @@ def test_words_are_the_same_in_python_and_on_the_command_line():
 
 
 # one way from a problem, its graph or an instance to a plan; which level of engines answers
-
-
 WORST = seqopt.CRITERIA["worst-ratio"]
 
 
@@ -253,6 +250,7 @@ def test_a_problem_its_graph_and_its_instance_have_one_optimum():
     assert [plan.graph for plan in plans[1:]] == [states, arcs]
 
 
+@pytest.mark.slow
 def test_a_formulation_takes_the_aim_that_is_asked():
     """Its own aim holds where none is asked; what it cannot make small it refuses itself."""
     for goals in ("sum", "minmax", "steps", "minmax,steps"):

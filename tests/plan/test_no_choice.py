@@ -1,7 +1,5 @@
 """Problems without a choice; the search that solves only the models it meets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -154,6 +152,7 @@ def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said
     assert type(caught.value) is error
 
 
+@pytest.mark.slow
 def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path, capsys):
     """A package of others that is wrong spoils no command that does not ask for it."""
     whole = formulations()
@@ -183,8 +182,7 @@ def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path
 
 
 # the search that solves only the models it meets: dead ends, what ranks depend on
-
-
+@pytest.mark.slow
 def test_a_dead_end_that_the_cascade_foresees(engine25, loop25):
     problem = pose(engine25, loop25, EQUATIONS, limits=[Limit("T_max", 64.0)])
     with pytest.raises(NothingFoundError, match="step 31: no grip is allowed after the choices"):

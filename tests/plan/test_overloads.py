@@ -1,16 +1,18 @@
-"""What is promised of every step; one way to solve."""
-
-from __future__ import annotations
+"""Plans over their robots' payloads are named; sweeps over scenes and options."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import seqopt
 from experiments.harness.layers import LayeredCosts
 from seqopt import Search
+from seqopt._cli.main import main
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states import build_states
@@ -18,6 +20,7 @@ from seqopt.plan._infeasible import payload_advice
 from seqopt.plan.solve import graph_of, solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
+from seqopt.sweep import sweep
 from seqopt.workflow import Robust
 from tests.builders import Counting, small_arch
 from tests.layered import Costs
@@ -119,8 +122,6 @@ def test_a_free_schedule_says_so_too():
 
 
 # one way to solve: what is computed when, what a plan says of itself, what a watch is told
-
-
 WORST = seqopt.CRITERIA["worst-ratio-published"]
 
 
@@ -137,6 +138,7 @@ def test_posing_computes_nothing(counted):
     assert plan.models == engine.sets > 0
 
 
+@pytest.mark.slow
 def test_a_search_without_proof_computes_only_what_it_meets(counted):
     engine, problem = counted
     plan = seqopt.solve(graph_of(problem), "cascade", proof=False)
@@ -153,6 +155,7 @@ def test_a_search_without_proof_computes_only_what_it_meets(counted):
     assert "not compared" in repr(plan)
 
 
+@pytest.mark.slow
 def test_a_plan_shows_its_steps_and_choices(engine25):
     plan = seqopt.optimize(engine25.network.scene, engine="compliance")
     assert next(iter(plan.seconds)) == "assemble"
@@ -174,6 +177,7 @@ def test_a_plan_of_costs_alone_has_a_path_and_no_steps():
             ask()
 
 
+@pytest.mark.slow
 def test_every_plan_has_one_summary():
     """Its keys do not depend on what was chosen from, but for the criterion's and the order's."""
     scene, ones = small_arch(5), seqopt.CRITERIA["worst-ratio"]
@@ -185,7 +189,7 @@ def test_every_plan_has_one_summary():
         seqopt.optimize(scene, criterion=ones, robust=Robust(count=2)),
         seqopt.optimize(scene, "free", order="search"),
     ]
-    own = {"criterion", *(name for plan in plans for name in criterion_of(plan).settings)}
+    own = {"criterion", *(name for plan in plans for name in plan.problem.criterion.settings)}
     keys = [{k for k in p.summary() if k not in own and not k.startswith("order")} for p in plans]
     assert keys == [keys[0]] * len(plans)
     assert [type(plan.summary()["objective"]) for plan in plans] == [dict] * len(plans)
@@ -193,10 +197,6 @@ def test_every_plan_has_one_summary():
     for plan in plans:
         assert len(plan.responses()) == len(plan.steps)
         assert len(plan.table()) > 0
-
-
-def criterion_of(plan):
-    return plan.problem.criterion
 
 
 def problem():
@@ -223,3 +223,102 @@ def test_what_takes_no_watch_takes_no_time_limit():
     with pytest.raises(ProblemError, match="bare takes no time limit; leave it out"):
         solve(problem(), bare, time_limit=1.0)
     assert "watch" not in exact.options
+
+
+# many problems side by side: rows as they come, what is left after an end, what has no plan
+WORDS = [f"wall:columns=2,courses={count}" for count in (1, 2)]
+free = partial(seqopt.optimize, schedule="free", aim="F_largest,steps")
+
+
+def test_every_row_is_what_one_problem_has(tmp_path):
+    found = sweep(WORDS, free, mortars=["dry"], out=tmp_path / "rows.csv")
+    assert [*found["problem"]] == WORDS
+    for row in found.to_dict("records"):
+        plan = free(row["problem"])
+        assert row["F_largest"] == pytest.approx(plan.objective["F_largest"], rel=1e-8)
+        assert row["F_largest_bound"] == pytest.approx(row["F_largest"], rel=1e-8)
+        assert (row["steps"], row["status"]) == (len(plan.steps), "optimal")
+        falls = sum(verdict.value == "does not stand" for verdict in plan.verdicts("dry"))
+        assert row["falls_dry"] == falls
+    stored = pd.read_csv(tmp_path / "rows.csv")
+    pd.testing.assert_frame_equal(stored, found, check_dtype=False, rtol=1e-8)
+
+
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_sweep_that_was_interrupted_goes_on_where_it_ended(tmp_path, workers):
+    """Rows that are there are kept as they are, the others are the same as without an end."""
+    path = tmp_path / "rows.csv"
+    whole = sweep(WORDS, free, out=path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], lines[1].replace("optimal", "kept"), ""]))
+    again = sweep(WORDS, free, out=path, workers=workers)
+    assert [*again["status"]] == ["kept", "optimal"]
+    assert [*again["F_largest"]] == pytest.approx([*whole["F_largest"]], rel=1e-8)
+    sweep(WORDS, lambda scene: pytest.fail("it is known"), out=path)
+    other = replace(seqopt.load_scene(WORDS[0]), name="other")
+    assert len(sweep([other], free, out=path)) == 1
+    assert len(pd.read_csv(path)) == 3  # rows of other problems stay
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(ProblemError, match="no table of a sweep"):
+        sweep(WORDS, free, out=path)
+
+
+def test_a_problem_without_a_plan_is_a_row_that_says_why():
+    scene = seqopt.load_scene(WORDS[0])
+    weak = replace(scene.with_robots(*(replace(r, payload=1.0) for r in scene.robots)), name="weak")
+    found = sweep([scene, weak], free)
+    assert [*found["status"]] == ["optimal", "infeasible"]
+    assert "it becomes possible" in found["why"][1]
+    with pytest.raises(ProblemError, match="two problems are called wall 2 x 1; give scenes names"):
+        sweep([scene, scene.with_grips(1e6)], free)
+
+
+def told(*words):
+    return main(["sweep", *words, "--schedule", "free", "--aim", "F_largest,steps"])
+
+
+@pytest.mark.slow
+def test_a_command_sweeps_ranges_and_options(tmp_path, capsys):
+    out = tmp_path / "s"
+    words = ["wall:columns=2,courses=1..2/2", "--over", "payload=1,400", "--out", str(out)]
+    assert told(*words) == 0
+    assert "4 problems: 2 infeasible, 2 optimal" in capsys.readouterr().out
+    rows = pd.read_csv(out / "sweep.csv")
+    assert [*rows["payload"]] == [1, 400, 1, 400]
+    assert [*rows["scene"]] == [word for word in WORDS for _ in range(2)]
+    assert rows["F_largest"].notna().tolist() == [False, True, False, True]
+    assert (out / "sweep.png").stat().st_size > 5000
+    assert told(*words) == 0  # all rows are there
+    assert pd.read_csv(out / "sweep.csv").equals(rows)
+    assert told("wall:columns=2,courses=1", "--over", "payload=1") == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["wall:columns=2..x/2"], "range 2..x/2: could not convert"),
+        (["arch:span=1..2/0"], "give from 1 to"),
+        (["arch25", "--over", "payloads=2"], "no option payloads (did you mean payload?)"),
+    ],
+)
+def test_ranges_that_are_none_are_refused(words, said, capsys):
+    assert told(*words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_workers_begin_with_the_largest_of_a_range():
+    """Ranges go up: else the largest problem would end alone."""
+    begun = []
+
+    def refused(own):
+        begun.append(own["size"])
+        raise ProblemError("too large")
+
+    given = {f"p{size}": {"size": size} for size in (1, 2, 3, 4)}
+    with ThreadPoolExecutor(1) as executor:
+        found = sweep(given, refused, executor=executor)
+    assert begun == [4, 3, 2, 1]
+    assert [*found["size"]] == [1, 2, 3, 4]  # as they were given
+    begun.clear()
+    sweep(given, refused)
+    assert begun == [1, 2, 3, 4]

@@ -1,7 +1,5 @@
 """Plans with props; what becomes of a plan where something has changed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -135,8 +133,6 @@ def test_props_make_plans_stand_dry():
 
 
 # what becomes of a plan where something has changed
-
-
 def held_arch(count=6, robots=3):
     more = (seqopt.Robot(name=f"rob{k}", payload=150.0) for k in range(1, robots + 1))
     return small_arch(count).with_robots(*more)
@@ -189,6 +185,7 @@ def test_the_old_rest_goes_on_where_nothing_changed():
     assert first["differs"] == rest.steps[-1].number
 
 
+@pytest.mark.slow
 def test_the_old_rest_is_asked_for_its_margins():
     """Of what goes on nobody claims a margin: it is what is proven of its steps."""
     problem = seqopt.pose(

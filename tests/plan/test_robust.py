@@ -1,7 +1,5 @@
 """Plans for many scenarios: right against brute force and programs, and refused where they lie."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -128,8 +126,6 @@ def test_plans_agree_with_the_program(aim, layers):
 
 
 # negative controls: a wrong claim is seen
-
-
 LAYERS = tuple(
     LayeredCosts((np.array(single),), (np.zeros((1, 2)),)) for single in ([3.0, 1.0], [0.0, 4.0])
 )
@@ -175,8 +171,6 @@ def test_the_gap_that_weights_leave_is_real_here():
 
 
 # scenes
-
-
 def posed(limits=(), workers=1):
     network = seqopt.build_network(six_bricks())
     engine = seqopt.make_engine("compliance", network)
@@ -189,6 +183,7 @@ def posed(limits=(), workers=1):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aim", AIMS[:3], ids=str)
 def test_a_plan_over_scenarios_shows_its_choice(aim):
     problem = posed()
@@ -226,8 +221,6 @@ def largest_force(scene, plan):
 
 
 # bad input
-
-
 def test_aims_in_words():
     assert [parse_robust(str(aim)) for aim in AIMS] == [*AIMS]
 

@@ -1,7 +1,5 @@
 """Amounts; what criteria make of responses."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt._registry import ADDED
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.plan.solve import graph_of
 from seqopt.problem import Amount, Filter
@@ -34,6 +31,8 @@ from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
 
+pytestmark = pytest.mark.usefixtures("alone")
+
 PACKAGE = """
 import numpy as np
 from seqopt.plan.solve import graph_of
@@ -46,15 +45,6 @@ AWAY = Filter("away", lambda states: (states.nodes != 3).all(axis=1))
 
 def busy(states):
     return (states.nodes >= 0).sum(axis=1)
-
-
-@pytest.fixture(autouse=True)
-def alone():
-    """What one test registers no other one finds."""
-    before = {**ADDED}
-    yield
-    ADDED.clear()
-    ADDED.update(before)
 
 
 def posed(goals, limits=(), schedule=None, **words):
@@ -234,8 +224,6 @@ def test_what_is_no_budget_is_refused(text, said):
 
 
 # what criteria make of responses, by hand: ranks, weights, scales, limits
-
-
 NAN = np.nan
 
 

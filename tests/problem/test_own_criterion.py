@@ -1,7 +1,5 @@
 """Criteria people bring; what criteria take from a scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 
@@ -117,8 +115,6 @@ def test_what_is_no_function_is_refused():
 
 
 # aims in their order
-
-
 def values(goals):
     """What every allowed choice is worth, in the order of the aims."""
     found = {}
@@ -151,8 +147,6 @@ def test_aims_in_their_order_agree_with_brute_force(problem, data):
 
 
 # what criteria take from a scene: crown, units, scales; and that none of it is one arch's
-
-
 def facts_of(scene):
     return SceneFacts(seqopt.make_engine("compliance", scene))
 
@@ -239,7 +233,9 @@ def test_a_criterion_that_is_not_posed_says_so():
             criterion.costs({name: np.ones(3) for name in ("T_max", "F_largest")}, 3, 3)
 
 
-@pytest.mark.parametrize("name", ["equations-2-3", "worst-ratio"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("equations-2-3", marks=pytest.mark.slow), "worst-ratio"]
+)
 @given(
     scene=arches(min_bricks=4, max_bricks=7).map(far_reaching),
     power=st.tuples(*[st.integers(-8, 8)] * 3),

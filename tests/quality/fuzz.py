@@ -20,8 +20,6 @@ Inputs: five small scenes. Command: ``python -m tests.quality.fuzz [--cases N] [
 exit status is 1 if there is a fault.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import faulthandler

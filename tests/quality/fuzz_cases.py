@@ -1,7 +1,5 @@
 """Scenes, plans and words, changed at random from some that are right."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Sequence
@@ -183,8 +181,6 @@ def write_case(case: Case, folder: Path) -> None:
 
 
 # scenes
-
-
 def _changed_scene(rng: np.random.Generator, document: dict[str, Any]) -> str:
     out = copy.deepcopy(document)
     for _ in range(int(rng.integers(1, 4))):
@@ -287,8 +283,6 @@ def _noise(rng: np.random.Generator, text: str) -> str:
 
 
 # plans
-
-
 def _changed_plan(rng: np.random.Generator, plan: str) -> str:
     rows = [line.split(",") for line in plan.strip().split("\n")]
     for _ in range(int(rng.integers(1, 4))):

@@ -161,8 +161,6 @@ def right_files() -> dict[str, File]:
 
 
 # damage
-
-
 def damaged(rng: np.random.Generator, content: bytes) -> bytes:
     """Return a file in which something is changed: as what it is, or as bytes."""
     if content[:2] == b"PK" and rng.random() < 0.8:

@@ -8,8 +8,6 @@ Command: ``python -m tests.quality.kernels`` prints the name of a kernel that th
 and does not by default; nothing where there is none. With ``running`` it prints those that run.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

@@ -1,8 +1,7 @@
-"""Input changed at random, at small size; and the judge of it, which must see faults."""
-
-from __future__ import annotations
+"""Input changed at random, and the judge of it; another kernel is named, and runs where asked."""
 
 import io
+import os
 import subprocess
 import sys
 import tracemalloc
@@ -18,6 +17,7 @@ from tests.quality import fuzz
 from tests.quality.fuzz import judge, main, run
 from tests.quality.fuzz_cases import Mutator
 from tests.quality.fuzz_files import read_damaged, right_files
+from tests.quality.kernels import other, running
 
 CASES = 120
 
@@ -173,3 +173,26 @@ def test_what_only_counts_takes_no_memory(tmp_path):
     name, _, read = right_files()["plan"]
     (tmp_path / name).write_bytes(b"a," * 20_000 + b"\n1" * 20_000)
     assert _takes(tmp_path / name, read) < MOST
+
+
+# another kernel is named, and runs where it is asked for
+CODE = "from tests.quality.kernels import running; print(*running().values())"
+
+
+@pytest.mark.skipif(not other(), reason="no OpenBLAS, or no other kernel by name")
+def test_the_other_kernel_runs_where_it_is_asked_for():
+    asked = os.environ | {"OPENBLAS_CORETYPE": other()}
+    command = [sys.executable, "-c", CODE]
+    ran = subprocess.run(command, env=asked, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert {*ran.stdout.split()} == {other()}
+    assert other() not in running().values()  # the control
+
+
+def test_every_run_says_which_kernels_it_has(pytestconfig):
+    (line,) = (
+        line
+        for line in pytestconfig.hook.pytest_report_header(config=pytestconfig, start_path=ROOT)
+        if "kernels" in line
+    )
+    for package, kernel in running().items():
+        assert f"{package} {kernel}" in line

@@ -1,7 +1,5 @@
 """What a notebook shows; what a page opens with; every plan says what it took."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json
@@ -42,6 +40,7 @@ def images(html):
     return [Image.open(io.BytesIO(base64.b64decode(text))) for text in found]
 
 
+@pytest.mark.slow
 def test_every_value_says_what_it_is_with_a_picture_and_is_light(values):
     for name, value in values.items():
         html = value._repr_html_()
@@ -68,8 +67,6 @@ def test_names_of_others_are_escaped(values):
 
 
 # what a page opens with: the step that decides, one sentence, and a summary on one sheet
-
-
 STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
 
@@ -172,8 +169,6 @@ def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp
 
 
 # every plan says what it took, and what had to be
-
-
 SMALL = "chain:bricks=7"
 
 
@@ -188,6 +183,7 @@ def test_no_response_is_computed_that_nobody_asks_for():
     assert spent["responses"]["computed"] == ["T_max"]
 
 
+@pytest.mark.slow
 def test_verdicts_are_counted_once():
     plan = seqopt.optimize(SMALL, "free", aim="minmax,steps", stands="dry")
     sets = plan.spent["verdicts"]
@@ -202,6 +198,7 @@ def test_verdicts_are_counted_once():
     assert prover.proven > before
 
 
+@pytest.mark.slow
 def test_the_summary_has_it(tmp_path, capsys):
     command(capsys, "optimize", SMALL, "--out", tmp_path / "plan")
     found = json.loads((tmp_path / "plan/summary.json").read_text())

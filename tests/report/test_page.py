@@ -1,7 +1,5 @@
 """The page with the step viewer; robots that are drawn."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib
@@ -264,6 +262,7 @@ def tables_of(text):
     return [re.findall(r"<t[hd][^>]*>(.*?)</t", row) for row in rows]
 
 
+@pytest.mark.slow
 def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(engine25, builds):
     table = builds["sequential"].table.copy()
     table.loc[[3, 8], "F_rob1_N"] = [1565.0, 400.0]
@@ -300,8 +299,6 @@ def test_the_policy_names_every_script_and_style_and_nothing_else(engine25, buil
 
 
 # robots that are drawn: arms end where they hold, and stand where their reach says
-
-
 FRONT = Side(toward=(0.0, -1.0, 0.0), point=(0.0, 9.0, 0.0))
 ROBOTS = (
     Robot(name="left", payload=5000.0, reach=Sphere(center=(-0.3, -0.5, 0.4), radius=2.0)),

@@ -1,7 +1,5 @@
 """Dask's executor on a local cluster: the same results, also where a worker is killed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

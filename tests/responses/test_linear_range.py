@@ -1,7 +1,5 @@
 """Results outside the range of small displacements and elastic joints are never passed over."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from dataclasses import replace
@@ -67,6 +65,7 @@ def test_the_plans_of_the_reference_arch_are_within(arch25, engine):
     assert within.unchecked == ()
 
 
+@pytest.mark.slow
 def test_every_limit_is_told_from_the_others(arch25, soft):
     moved = found(soft)["displacement"]
     assert moved.said == "30.59 mm, more than 5.3 mm, a tenth of the smallest side of a brick"
@@ -165,10 +164,10 @@ FREE = ("optimize", "--schedule", "free", "--aim", "steps")
     "words",
     [
         ("analyze", "--method", "sequential"),
-        pytest.param(("compare",), marks=pytest.mark.slow),
-        pytest.param(LOOP, marks=pytest.mark.slow),
-        FREE,
-        pytest.param(("pareto", "--aim", "steps,D_max"), marks=pytest.mark.slow),
+        *(
+            pytest.param(words, marks=pytest.mark.slow)
+            for words in (("compare",), LOOP, FREE, ("pareto", "--aim", "steps,D_max"))
+        ),
     ],
     ids=" ".join,
 )
@@ -213,8 +212,6 @@ def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, en
 
 
 # the largest over the ground ends is what tables, criteria and limits see
-
-
 @pytest.fixture(scope="module")
 def arch():
     return ComplianceEngine(build_network(from_both_sides(9, "VLR")))

@@ -3,8 +3,6 @@
 Engines are asked about props as about grips, whose agreement other tests show.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -131,8 +129,6 @@ def test_centering_leaves_robots_their_nodes():
 
 
 # staged construction: closed forms, laws, and a second route that keeps every reference itself
-
-
 PLACE, RELEASE, HOLD = StepKind.PLACE, StepKind.RELEASE, StepKind.REPOSITION
 
 
@@ -182,8 +178,6 @@ def scratch(network, step):
 
 
 # closed forms
-
-
 def test_two_bricks_by_hand():
     """Weights w on springs k: the second is placed on the first as it hangs free, and held.
 
@@ -216,8 +210,6 @@ def test_two_bricks_by_hand():
 
 
 # laws
-
-
 def released_in_between(scene):
     """One brick after the other, each held when it is placed and let go at once."""
     network = build_network(scene)
@@ -239,6 +231,7 @@ def test_without_loops_nothing_is_locked_in_once_all_let_go(scene):
             assert largest_difference(fields, scratch(network, step), network) < 1e-7
 
 
+@pytest.mark.slow
 def test_a_closed_arch_remembers_how_it_was_built(arch25):
     """Both build the same structure; what is locked in differs, the weight does not."""
     network = build_network(arch25)
@@ -254,8 +247,6 @@ def test_a_closed_arch_remembers_how_it_was_built(arch25):
 
 
 # a second route: not increments, but every spring's and grip's own reference
-
-
 def by_references(network, steps):
     """Yield twists and grip forces from total equilibrium with initial strains, densely."""
     scene = network.scene

@@ -1,7 +1,5 @@
 """How far grips may be off: against closed forms, the engine itself, and every plan of a build."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

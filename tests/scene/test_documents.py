@@ -1,7 +1,5 @@
 """Scene files that are no scenes, however they are broken: one line each."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from dataclasses import fields, replace
@@ -113,6 +111,7 @@ def test_a_scene_comes_back_from_its_file(tmp_path, scene):
     assert dump_scene(_parse_scene(text)) == text
 
 
+@pytest.mark.slow
 def test_every_part_of_a_scene_is_drawn():
     """The control: the strategy leaves nothing at its default, so a new field must be drawn too."""
     seen = {}
@@ -130,8 +129,6 @@ def test_every_part_of_a_scene_is_drawn():
 
 
 # scenes: validation, the JSON file
-
-
 def test_the_reference_arch(arch25):
     """Section 3.1 of the paper: 25 bricks of 246 x 116 x 53 mm and 2420 kg/m3, 40 kg robots."""
     assert [b.name for b in arch25.placed] == list(range(1, 26))
@@ -225,8 +222,6 @@ def test_files(tmp_path, arch25):
 
 
 # what is probably not meant gets a warning that names it; ordinary scenes get none
-
-
 SCENE = six_bricks()
 
 

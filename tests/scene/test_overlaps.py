@@ -1,7 +1,5 @@
 """Solids that interpenetrate, and how deep: boxes by arithmetic, others by a program of its own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -100,6 +98,7 @@ def test_the_depth_of_convex_solids_is_that_of_a_program(size, turn, at):
 PARTS = [box((3, 1, 1)), box((1, 3, 1)), box((3, 1, 1), at=(0, 2, 0))]  # of the C, as boxes
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(
     size=st.tuples(*[st.floats(0.2, 1.5)] * 3),
@@ -118,8 +117,6 @@ def test_a_solid_that_is_not_convex_is_as_deep_as_its_parts(size, turn, at):
 
 
 # bricks as boxes: apart or not, told by two routes that share nothing
-
-
 MOST = 10.0
 
 
@@ -194,8 +191,6 @@ def test_bricks_of_a_scene_as_boxes_and_as_shapes():
 
 
 # polyhedra: volume, centroid and axes in closed form, and what is refused
-
-
 ANGLES = st.tuples(*[st.floats(-3, 3)] * 3)
 SIZES = st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3)
 

@@ -1,7 +1,6 @@
-"""Scenarios: what varies, by how much, and what stays."""
+"""Loads of scenes and scenarios drawn of them."""
 
-from __future__ import annotations
-
+import json
 import math
 from dataclasses import replace
 
@@ -10,10 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.errors import SceneError, StepError
+import seqopt
+from seqopt import Prop
+from seqopt._cli.main import main
+from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange.imports import read_measured
+from seqopt.report.page import Build, report_page
+from seqopt.scene import Load, load_scene
+from seqopt.scene.library.wall import WallShape, wall
 from seqopt.scene.scenarios import as_built, scenarios
-from tests.builders import six_bricks
+from seqopt.scene.scene import _from_all_ends, _parse_order, in_order
+from seqopt.scene.scene_file import save_scene, scene_to_dict
+from seqopt.sequence.schedule import islands
+from tests.builders import six_bricks, small_arch
 from tests.strategies import arches
 
 
@@ -73,6 +81,7 @@ def test_what_varies_stays_in_its_bounds_and_all_else_as_it_is(
             assert stub == pytest.approx(np.subtract(theirs.anchor, theirs.position), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_draws_spread_as_they_are_said_to():
     """Log-uniform factors and uniform shares: means and spreads of many draws."""
     scene = six_bricks()
@@ -130,8 +139,6 @@ def test_grips_vary_by_kind_and_leave_all_else():
 
 
 # bricks that stand where they were measured
-
-
 SCENE = six_bricks()
 STEP = st.tuples(*[st.floats(-0.01, 0.01)] * 3)
 
@@ -170,3 +177,204 @@ def test_what_was_measured_wrong_is_named(tmp_path):
             read_measured(SCENE, path)
     path.write_text("brick,x,y,z\n2,0.1,0.2,0.3\n")
     assert read_measured(SCENE, path) == {2: (0.1, 0.2, 0.3)}
+
+
+# loads; orders of a scene
+def loaded():
+    scene = six_bricks()
+    first, second = scene.grounds
+    return replace(
+        scene,
+        loads=(
+            Load(brick=2, force=(1.0, 2.0, -30.0)),
+            Load(brick=3, force=(0.0, 0.0, -5.0), position=scene.bricks[2].position, since=6),
+        ),
+        wind=(0.1, 0.0, 0.0),
+        weight_factor=1.35,
+        grounds=(first, replace(second, movement=(0.0, 0.0, -0.002))),
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"loads": (Load(brick=9, force=(0, 0, 1)),)}, "load on brick 9: there is no brick 9"),
+        ({"loads": (Load(brick=1, force=(0, 0, 1), since=8),)}, "there is no brick 8"),
+        (
+            {"loads": (Load(brick=1, force=(0, 0, 1), position=(0, 0, 1e10)),)},
+            "load on brick 1: position is .*; move it to its brick",
+        ),
+        ({"wind": (1e7, 0.0, 0.0)}, "wind is .*; give shares of the weight"),
+        ({"weight_factor": 1e150}, "brick 1: it weighs .*; correct its density"),
+        (
+            {"grounds": (replace(six_bricks().grounds[0], movement=(0, 0, 1e30)),)},
+            "ground end of brick 1: movement is .*; move it to its bricks",
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(change, message):
+    with pytest.raises(SceneError, match=message):
+        replace(six_bricks(), **change)
+
+
+@pytest.mark.parametrize(
+    ("movement", "message"),
+    [
+        ((0, 0), "movement is .*; give three or six numbers"),
+        ((0, 0, np.nan), "movement is .*; give three finite numbers"),
+        (0.1, "movement is 0.1; give three or six numbers"),
+    ],
+)
+def test_a_movement_that_is_none_is_refused(movement, message):
+    with pytest.raises(SceneError, match=f"ground end of brick 1: {message}"):
+        replace(six_bricks().grounds[0], movement=movement)
+    with pytest.raises(SceneError, match="give three finite numbers"):
+        Load(brick=1, force=(0, 0, np.inf))
+
+
+def test_a_load_far_from_its_brick_is_doubted(tmp_path):
+    far = replace(six_bricks(), loads=(Load(brick=1, force=(0, 0, -1), position=(0, 0, 9.0)),))
+    save_scene(far, tmp_path / "own.json")
+    with pytest.warns(SceneWarning, match=r"load on brick 1: it lies 8\.\d+ m from brick 1"):
+        load_scene(tmp_path / "own.json")
+
+
+def test_scenarios_take_loads_along():
+    scene = loaded()
+    for each in seqopt.scenarios(scene, count=3).scenes:
+        step = np.subtract(each.bricks[2].position, scene.bricks[2].position)
+        assert np.abs(step).max() > 1e-5
+        assert each.loads[1].position == pytest.approx(step + scene.loads[1].position)
+        assert each.loads[0] == scene.loads[0]
+        assert each.grounds[1].movement == scene.grounds[1].movement
+
+
+def test_what_acts_depends_on_what_stands():
+    scene = loaded()
+    network = seqopt.build_network(replace(scene, wind=(0.0, 0.0, 0.0)))
+    acting = [np.flatnonzero(network.applied(b).any(axis=1)).tolist() for b in range(1, 7)]
+    assert acting == [[], [1], [1], [1], [1], [1, 2]]
+    backward = seqopt.build_network(scene.with_robots(*scene.robots), "reversed")
+    assert np.flatnonzero(backward.loads[1]).size == 8
+    assert backward.loads[1][:2].tolist() == [5, 4]
+    assert network.applied(6, before=5)[:, 2].tolist() == [0, 0, -5, 0, 0, 0]
+
+
+def test_it_is_told(tmp_path, capsys):
+    scene = loaded()
+    said = "2 forces, up to 30.0832 N, wind of (0.1, 0, 0) times the weight"
+    assert scene.loading.startswith(said)
+    assert scene.loading.endswith("weights times 1.35, movement of 1 ground end")
+    assert six_bricks().loading == ""
+    assert "2 forces, up to" in scene._repr_html_()
+    assert "Beside the weight" not in six_bricks()._repr_html_()
+    save_scene(scene, tmp_path / "own.json")
+    assert main(["scene", str(tmp_path / "own.json")]) == 0
+    assert "beside the weight: 2 forces, up to" in " ".join(capsys.readouterr().out.split())
+    engine = seqopt.make_engine("compliance", scene)
+    steps = seqopt.sequential(engine.network)
+    build = Build("own", steps, seqopt.analyze(engine, steps))
+    assert "Counted, and not drawn: 2 forces" in report_page(engine, [build], "A build.")
+
+
+# props as parts of scenes: what they take, where they stand, and what files say of them
+@pytest.mark.parametrize(
+    ("props", "said"),
+    [
+        ([{"node": 99}], "prop at node 99: there is no free node 99; known are"),
+        ([{"node": 3}, {"node": 3}], "a prop at node 3 occurs twice; give each its own"),
+        ([{"node": 0}], "prop at node 0: there is no free node 0"),  # it is blocked
+    ],
+)
+def test_props_that_do_not_fit_a_scene(props, said):
+    with pytest.raises(SceneError, match=said):
+        load_scene("arch25").with_props(*(Prop(**each) for each in props))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"node": 0.5}, "prop: node is 0.5; give a whole number"),
+        ({"node": 3, "direction": (0, 0, 0)}, "direction is .* give one that is not zero"),
+        ({"node": 3, "stiffness": -1}, "prop at node 3: stiffness is -1; give one number or three"),
+    ],
+)
+def test_wrong_props_get_one_line(words, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        Prop(**words)
+    assert "\n" not in str(caught.value)
+
+
+def test_props_stand_from_their_bricks_until_the_whole_is_let_go():
+    scene = small_arch(5)
+    nodes = [scene.placed[k].nodes[0] for k in (3, 1)]
+    scene = scene.with_props(*(Prop(node=node) for node in nodes))
+
+    def standing(bricks, held):
+        return [prop.node for prop in scene.standing_props(bricks, held=held)]
+
+    assert [standing(k, held=False) for k in range(6)] == [[], [], nodes[1:], nodes[1:], nodes, []]
+    assert standing(5, held=True) == nodes
+    assert not {*nodes} & {n for own in scene.within_reach(scene.robots[0]) for n in own}
+
+
+def test_a_file_keeps_props_and_scenes_without_say_nothing(tmp_path):
+    scene = small_arch(4)
+    assert "props" not in scene_to_dict(scene)
+    props = Prop(node=3, stiffness=1e6, direction=(0, 0, 1), capacity=90), Prop(node=5)
+    save_scene(scene.with_props(*props), tmp_path / "own.json")
+    assert load_scene(tmp_path / "own.json").props == props
+    document = json.loads((tmp_path / "own.json").read_text("utf-8"))
+    assert document["props"][1] == {"node": 5}
+    document["props"][1] = {"node": 5, "position": [0, 0, 0]}
+    (tmp_path / "own.json").write_text(json.dumps(document), "utf-8")
+    with pytest.raises(SceneError, match=r"props\[1\]"):
+        load_scene(tmp_path / "own.json")
+
+
+# orders of a scene: by name, by words, and what is said of those that are none
+def test_orders_by_name():
+    scene = small_arch(5)
+    assert _parse_order(scene, "reversed") == (5, 4, 3, 2, 1)
+    assert _parse_order(scene, "ends") == (1, 5, 2, 4, 3)
+    assert _parse_order(scene, "1..2, 5..4,3") == (1, 2, 5, 4, 3)
+    assert in_order(scene, None) is scene
+    network = seqopt.build_network(scene, (2, 1, 3, 4, 5))
+    assert network.scene.build_order == (2, 1, 3, 4, 5)
+    assert [len(islands(network, count)) for count in (1, 2)] == [1, 0]
+
+
+def test_from_all_ends_leaves_nothing_that_hangs():
+    scene = wall(WallShape(courses=3, columns=3))
+    network = seqopt.build_network(scene, "ends")
+    assert sorted(_from_all_ends(scene)) == sorted(scene.build_order)
+    assert not any(islands(network, count) for count in range(1, len(scene.bricks) + 1))
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ("backwards", "order 'backwards': give reversed, ends, or names of bricks"),
+        ("1,2,3", "order: 2 bricks are missing, 4 among them"),
+        ("1,2,3,4,4", "order: 4 occurs twice"),
+        ((1, 2, 3, 4, 7), "order: 7 is no brick"),
+        (7, "order is 7; give whole numbers"),
+    ],
+)
+def test_what_is_no_order_gets_one_line(order, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        seqopt.build_network(small_arch(5), order)
+    assert "\n" not in str(caught.value)
+
+
+# orders after words
+def test_a_vault_closes_from_both_springings():
+    scene = load_scene("vault:span=1.5,rise=0.5,columns=2,order=ends")
+    courses = len(scene.bricks) // 2
+    assert {ground.brick for ground in scene.grounds} == {1, 2, 2 * courses - 1, 2 * courses}
+    assert {*scene.build_order[:4]} == {ground.brick for ground in scene.grounds}
+    (crown,) = {(name - 1) // 2 for name in scene.build_order[-2:]}
+    assert crown == courses // 2
+    bent = [brick.position[2] for brick in scene.bricks]
+    assert max(bent) == pytest.approx(0.5, rel=0.02)
+    assert bent == pytest.approx(bent[::-1])  # it is symmetric

@@ -1,7 +1,5 @@
 """Values that no field can have: one line names the object, the field and what to give."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import pytest
@@ -81,8 +79,6 @@ def test_what_is_given_beside_a_file_is_named(tmp_path, given, said):
 
 
 # where the parts of a scene lie: what leaves nothing to compute is refused in the scene
-
-
 def with_part(scene, kind, index, **change):
     """The scene with one brick, joint or ground end changed."""
     parts = list(getattr(scene, kind))

@@ -1,7 +1,5 @@
 """Who places a brick, or takes it away, carries all of it: in every schedule, search and judge."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -124,9 +122,8 @@ def test_orders_put_the_heavy_brick_into_strong_hands():
 AIMED = [n for n, f in formulations("goals").items() if f.aim]
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] * (k % 3 > 0)) for k, n in enumerate(AIMED)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", AIMED)
 def test_every_formulation_of_a_loop_refuses_it(name):
     said = r"in step 1 brick 1 weighs 23\.5 N, more than the payload of rob1 \(22 N\)"
     with pytest.raises(InfeasibleError, match=said) as caught:
@@ -143,6 +140,7 @@ def loop(*payloads):
     return engine, seqopt.three_robot_loop(engine.network)
 
 
+@pytest.mark.slow
 def test_states_of_a_loop_are_refused_and_judged_too():
     engine, schedule = loop(141.0, 22.0, 141.0)
     said = r"in step 2 brick \d weighs 23\.5 N, more than the payload of rob2 \(22 N\)"

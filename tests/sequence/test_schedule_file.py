@@ -1,7 +1,5 @@
 """Schedules of one's own; take-downs."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -142,8 +140,6 @@ def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
 
 
 # plans from files
-
-
 COLUMNS = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
 
 
@@ -201,8 +197,6 @@ def test_a_plan_that_pandas_wrote_again_is_the_same(tmp_path, arch25):
 
 
 # take-downs: rules in plain words against an enumeration of one's own, plans, files, refusals
-
-
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
 DOWN = seqopt.FreeRules(direction="take-down")
 

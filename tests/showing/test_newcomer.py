@@ -1,7 +1,5 @@
 """From nothing to a picture and a page with one import: own arch, own wall, robots, both sides."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import webbrowser
@@ -29,6 +27,7 @@ def test_one_line_makes_a_plan_that_shows_itself():
         plan.engine.network.scene.with_robots("left")
 
 
+@pytest.mark.slow
 def test_a_report_shows_plans_side_by_side():
     scene = seqopt.load_scene("wall:columns=3,courses=2")
     free, loop = seqopt.optimize(scene, "free"), seqopt.optimize(scene)
@@ -39,6 +38,7 @@ def test_a_report_shows_plans_side_by_side():
         free.report(seqopt.optimize("wall:columns=2,courses=2"))
 
 
+@pytest.mark.slow
 def test_a_given_sequence_shows_itself_as_a_plan_does():
     scene = seqopt.load_scene("wall:columns=2,courses=2")
     engine = seqopt.make_engine("auto", scene)

@@ -1,7 +1,5 @@
 """Which steps stand of builds that are shown, against the verdict of every step on its own."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -37,6 +35,7 @@ def found(flat, builds):
     return BuildProver(flat).of_builds(builds)
 
 
+@pytest.mark.slow
 def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
     for name, steps in builds.items():
         for each, (mortar, held) in zip(found[name], SHOWN.items(), strict=True):
@@ -66,6 +65,7 @@ def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeyp
     assert len(open_) < len(steps) or not left
 
 
+@pytest.mark.slow
 def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     narrow = tuple(replace(brick, dimensions=(0.246, 0.09, 0.053)) for brick in arch25.bricks)
     scene = replace(arch25, bricks=narrow)  # those across are 26 mm apart
@@ -82,6 +82,7 @@ def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     assert (out / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch):
     """Steps of as many bricks are tried by what they have in common, of use or not."""
     tried, real = [], VerdictChain.__call__

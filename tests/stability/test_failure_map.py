@@ -1,7 +1,5 @@
 """A map of failure: its counts are verdicts, and what it says would cure a build does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

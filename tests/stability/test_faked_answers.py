@@ -3,8 +3,6 @@
 They come from the solver of the cone program, or from what a chain of verdicts tries before it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import product, starmap
@@ -248,8 +246,6 @@ def by_value(stand):
 
 
 # verdicts and their proofs: solvers that lie or stall, every published step
-
-
 def liar(change):
     """A compiler whose programs change what the true one answers."""
 
@@ -309,8 +305,6 @@ def test_minus_infinity_is_no_proof():
 
 
 # structures that stand only because they are wedged in place are marked
-
-
 def bar(*, on_the_ground=False):
     """A bar between two walls; perhaps it lies on the ground as well."""
     base = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)

@@ -1,7 +1,5 @@
 """Screens: solvers that lie, what is asked of a solver at all, and wrong questions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
@@ -146,8 +144,6 @@ def test_wrong_questions_get_a_line(arch25):
 
 
 # what stands on props: the cone program, chains of verdicts and screens agree on which way
-
-
 UP = (0.0, 0.0, 1.0)
 DOWN = (0.0, 0.0, -1.0)
 HELD = {
@@ -229,8 +225,6 @@ def test_what_is_not_found_with_props_that_push_is_said(arch25):
 
 
 # how far structures can be tilted, whatever the direction
-
-
 def turned(assembly, angle):
     """The same assembly, turned about the vertical."""
     c, s = np.cos(angle), np.sin(angle)

@@ -1,7 +1,5 @@
 """Verdicts of steps apart from their margins; verdicts of many steps."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
@@ -133,8 +131,6 @@ def test_a_step_that_touches_nothing_is_not_called_standing(network, steps):
 
 
 # verdicts of many steps: those of the cone program, one by one, whatever is tried before it
-
-
 SCENES = {
     "arch": six_bricks,
     "both ends": lambda: from_both_ends(7),
@@ -253,8 +249,6 @@ def test_a_build_needs_no_cone_program(arch25, mortar):
 
 
 # what is offered is not believed
-
-
 def nonsense(assembly, seed):
     """Forces and motions of all sizes, some of them no numbers."""
     rng = np.random.default_rng(seed)
@@ -289,8 +283,6 @@ def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch)
 
 
 # numbers from elsewhere
-
-
 @pytest.mark.parametrize("lie", [False, True])
 def test_what_is_sought_near_what_fell_is_proven_of_the_whole(lie, monkeypatch):
     """Also where what is said to fall with it does not: then it proves nothing."""

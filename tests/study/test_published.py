@@ -1,6 +1,6 @@
 """The published plan: what it holds, and how its choices rank."""
 
-from __future__ import annotations
+import pytest
 
 from experiments.harness.ranks import rank_choice
 from seqopt.plan.solve import solve
@@ -12,6 +12,7 @@ def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25)
     assert loop25.fill(loop25.chosen(plan)) == plan
 
 
+@pytest.mark.slow
 def test_the_window_rank_is_the_studys_search(problem25):
     """The choice of the cascade is first in its own window, move by move; the optimum is not."""
     cascade, exact = (solve(problem25, name).nodes for name in ("cascade", "overlap_dp"))

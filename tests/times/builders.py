@@ -1,8 +1,7 @@
 """Builds in time by enumeration: every order of acts by named robots, state after state."""
 
-from __future__ import annotations
-
 import heapq
+from dataclasses import replace
 from functools import cache
 from itertools import count
 
@@ -11,6 +10,7 @@ import numpy as np
 import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY, _find_curing
+from seqopt.judge._schedules import judge_schedule
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
@@ -115,8 +115,6 @@ def acted(scene, kind, states, label):
 
 
 # builds whose mortar cures by enumeration: every order of acts, and every wait on a grid
-
-
 def stands_with(network, mortar=EPOXY):
     """A function that says by the cone program alone whether a state stands with some bonds."""
 
@@ -200,3 +198,7 @@ def started(scene, kind, states, label):
             return max(end, ready), own.place if placing else own.grip, ()
     gone = [r for r in range(len(before)) if before[r] is not None and after[r] is None]
     return end, max((scene.robots[r].durations.release for r in gone), default=0.0), gone
+
+
+def judged(plan, **changes):
+    return judge_schedule(replace(plan.graph), replace(plan.selection, **changes), plan.steps)

@@ -1,7 +1,5 @@
 """The least makespan is that of every order of acts by named robots, and is proven."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 
@@ -20,7 +18,14 @@ from seqopt.stability.standing import Standing
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
 from tests.brute_force import ONES
-from tests.times.builders import RULES, SLOW, engine_of, least_cured_makespan, least_makespan
+from tests.times.builders import (
+    RULES,
+    SLOW,
+    engine_of,
+    judged,
+    least_cured_makespan,
+    least_makespan,
+)
 
 LONG = (pytest.mark.slow, pytest.mark.long)
 CASES = [
@@ -111,8 +116,6 @@ def test_nothing_is_assumed_silently():
 
 
 # builds in time from any state: enumeration, rests of plans, ages of what stands, the judge
-
-
 ALONE = FreeRules(least_grips=1)
 CURES = "5min=1"
 
@@ -206,16 +209,10 @@ def test_wrong_ages_get_a_line(ages, said):
 
 
 # the judge of builds in time: what is wrong is refused, what is not proven is claimed
-
-
 @pytest.fixture(scope="module")
 def plan():
     problem = seqopt.pose(engine_of(4, 3, SLOW), RULES, ONES, "makespan")
     return seqopt.solve(problem)
-
-
-def judged(plan, **changes):
-    return judge_schedule(replace(plan.graph), replace(plan.selection, **changes), plan.steps)
 
 
 def test_what_is_claimed_is_proven_by_labels(plan):

@@ -1,7 +1,5 @@
 """Mortar that cures; laws of time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -13,7 +11,6 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
-from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
 from seqopt.scene import Durations
 from seqopt.sequence.rules import FreeRules
@@ -24,7 +21,7 @@ from seqopt.times._steps import step_times
 from seqopt.times._tables import busy_table, reassign
 from tests.brute_force import ONES
 from tests.commands import command as run
-from tests.times.builders import WORDS, engine_of, least_cured_makespan
+from tests.times.builders import WORDS, engine_of, judged, least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
 LONG = (pytest.mark.slow, pytest.mark.long)
@@ -75,6 +72,7 @@ def test_where_no_wait_is_enough_there_is_no_plan():
         cured(engine, "10min=1")
 
 
+@pytest.mark.slow
 def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
     engine = engine_of(4, 3)
     rules = FreeRules()
@@ -97,6 +95,7 @@ def test_slower_mortar_makes_no_build_shorter(robots):
         assert found[-1] > found[0]
 
 
+@pytest.mark.slow
 def test_no_step_comes_before_its_proof(plan):
     times, standing, network = plan.times(), plan.standing, plan.engine.network
     starts = times["start_s"].tolist()
@@ -109,10 +108,6 @@ def test_no_step_comes_before_its_proof(plan):
         early[i] -= 0.02 * times["cures_s"].iloc[i]
         with pytest.raises(SolverError, match=f"step {i + 1} is not proven to stand with the bond"):
             check_cured(network, plan.steps, standing, early)
-
-
-def judged(plan, **changes):
-    return judge_schedule(replace(plan.graph), replace(plan.selection, **changes), plan.steps)
 
 
 def test_the_judge_refuses_early_starts_and_missing_motions(plan):
@@ -217,8 +212,6 @@ def test_what_is_not_modeled_says_so():
 
 
 # laws of time: of given steps, of what robots do with it, and of who acts
-
-
 SCENE = seqopt.load_scene("arch25")
 NETWORK = seqopt.build_network(SCENE)
 STEPS = {"sequential": seqopt.sequential(NETWORK), "cantilever": seqopt.cantilever(NETWORK)}

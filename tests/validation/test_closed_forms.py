@@ -1,7 +1,5 @@
 """Level chains of bricks and single bricks, solved by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -108,8 +106,6 @@ def test_robots_carry_a_level_beam_by_symmetry():
 
 
 # the reference arch held softly, as a separate dense computation of springs at the grips gave it
-
-
 TABLE = {  # stiffness: largest force and displacement, sequential and cantilever
     None: ((406, 306), (409, 15.7)),
     1e7: ((401, 311), (405, 66)),
@@ -150,8 +146,6 @@ def test_a_brick_held_by_springs():
 
 
 # one block on its ground: friction, toppling, bonds and beds of springs in closed form
-
-
 @pytest.mark.parametrize("angle", [20.0, 24.9, 25.1, 30.0])
 def test_a_block_slides_beyond_the_angle_of_friction(angle):
     scene = block(lean=math.radians(angle))

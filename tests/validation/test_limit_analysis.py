@@ -1,7 +1,5 @@
 """Textbook limits: friction, overhangs, arches, hinges and levers in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import atan, cos, radians, sin, sqrt, tan
 
@@ -139,8 +137,6 @@ def test_a_block_that_only_a_robot_holds():
 
 
 # textbook limits of screens and their margins in closed form
-
-
 NOBODY = np.zeros((1, 0), dtype=int), np.zeros((1, 0))
 WEIGHT = 2000.0 * 9.81
 

@@ -1,7 +1,5 @@
 """Loads and movements of the ground in closed form, and laws that every engine keeps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -182,12 +180,9 @@ def test_discrete_elements_within_their_limits():
         assert apart(found, solve_mixed(network, 11, columns)) < 1e-8
 
 
-def combined(first, second):
-    """The sum of two answers."""
-    return type(first)(**{name: getattr(first, name) + getattr(second, name) for name in NAMES})
-
-
-@pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] * (k == "vault")) for k in SCENES]
+)
 def test_weight_loads_and_movements_add_up(kind):
     scene = loaded(SCENES[kind]())
     nothing = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 0.0}
@@ -206,7 +201,7 @@ def test_weight_loads_and_movements_add_up(kind):
             ]
             total = answers[0]
             for other in answers[1:]:
-                total = combined(total, other)
+                total = type(total)(**{n: getattr(total, n) + getattr(other, n) for n in NAMES})
             together = ComplianceEngine(scene).solve(bricks, [grips], Want.ALL)
             assert apart(together, total) < 1e-9
             assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)

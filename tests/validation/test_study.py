@@ -1,7 +1,5 @@
 """The figures that Bruun et al. printed: tables of steps, twisting, maxima of the methods."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -160,8 +158,6 @@ def test_improvement_table(compared25):
 
 
 # the printed sequences and the printed plan
-
-
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
 
 

@@ -1,7 +1,5 @@
 """What workers do in tests: in a module of its own, which they load in no time."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

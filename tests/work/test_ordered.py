@@ -1,7 +1,5 @@
 """Work that splits: as a loop, whoever works; workers that die end in a line, and leave nothing."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal
@@ -51,6 +49,7 @@ def test_tasks_are_taken_as_they_are_needed():
         results.close()
 
 
+@pytest.mark.slow
 def test_the_first_error_is_raised_whoever_works():
     for workers in (1, 2):
         found, crew = [], hire(workers=workers)

@@ -140,7 +140,7 @@ def cells(*, quick: bool) -> Iterator[Cell]:
         for each in (contrasts, loose_joints, soft_grounds, near_mechanisms, soft_grips, units):
             own = [*each(pattern)]
             yield from own[2::5] if quick else own
-        yield from sizes(pattern, (5, 25) if quick else (5, 10, 25, 50, 100, 200, 338, 1000))
+        yield from sizes(pattern, (5, 10) if quick else (5, 10, 25, 50, 100, 200, 338, 1000))
 
 
 def exact(cell: Cell) -> list[Exact]:
