@@ -82,7 +82,7 @@ class Given(ABC):
     @property
     @abstractmethod
     def alone_in_scene(self) -> NoReturn:
-        """Raise a `ProblemError`: there is no scene."""
+        """Raise a `ProblemError`, as it has no scene."""
 
     @abstractmethod
     def chosen_nodes(
