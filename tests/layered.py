@@ -14,7 +14,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, as_formulation
 from seqopt.graph.graph import PEAK, SUM, TAIL, _Target
 from seqopt.instances._solve import find_path
-from seqopt.instances.instance import _Cap
+from seqopt.instances.model import _Cap
 from seqopt.problem.problem import Aim, RobustAim
 
 

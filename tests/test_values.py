@@ -18,6 +18,7 @@ from seqopt.engines.interface import RIGID, Want, read_compliance
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system
 from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
+from seqopt.engines.rigid._stacked import StackedOperator
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange._meshes import Surface
 from seqopt.exchange.contacts import touching_faces
@@ -52,7 +53,8 @@ def values(arch25):
         *(touching, Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, network.compliances, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, seqopt.EPOXY)),
-        *(tree, operator, operator.doubts, parts, share(network)),
+        *(tree, operator, StackedOperator.of([operator, operator]), operator.doubts, parts),
+        share(network),
         mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points),
         *(_settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),

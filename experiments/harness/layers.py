@@ -18,7 +18,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.graph import PEAK, SUM, Graph, Rows, _Target, lexicographic
 from seqopt.graph.states import States
 from seqopt.instances.compiled import _pruned
-from seqopt.instances.instance import Instance, _Cap
+from seqopt.instances.model import Instance, _Cap
 from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Problem
 from seqopt.sequence.schedule import Move, Schedule

@@ -41,7 +41,7 @@ from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import fewest_moves, reached
 from seqopt.instances._solve import _claims
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 from seqopt.report import _style as inks
 from seqopt.report._style import dress, name_panels, plain, styled
 

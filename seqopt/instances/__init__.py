@@ -19,11 +19,20 @@ if TYPE_CHECKING:
     from seqopt.instances._files import read_instance, save_instance
     from seqopt.instances.answers import judge_instance
     from seqopt.instances.compiled import compile_instance, instance
+    from seqopt.instances.model import Instance
 
-__all__ = ["compile_instance", "instance", "judge_instance", "read_instance", "save_instance"]
+__all__ = [
+    "Instance",
+    "compile_instance",
+    "instance",
+    "judge_instance",
+    "read_instance",
+    "save_instance",
+]
 __getattr__, __dir__ = later(
     __name__,
     {
+        "Instance": "model",
         "compile_instance": "compiled",
         "instance": "compiled",
         "judge_instance": "answers",

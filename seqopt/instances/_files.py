@@ -18,7 +18,7 @@ from seqopt._registry import Later
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, _Target
 from seqopt.instances._program import as_mps
-from seqopt.instances.instance import Instance, _by_goal, _Cap
+from seqopt.instances.model import Instance, _by_goal, _Cap
 from seqopt.scene._checks import short
 from seqopt.times._graph import NOW, TimedGraph
 

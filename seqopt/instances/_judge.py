@@ -11,7 +11,7 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, _Target, _target_sums, tied
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 from seqopt.judge.arithmetic import (
     ABOVE,
     Closed,

@@ -19,7 +19,7 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 
 
 class Program(NamedTuple):

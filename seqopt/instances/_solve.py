@@ -17,7 +17,7 @@ from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, Solve
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch, timed
 from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, least_sum
 from seqopt.instances._judge import Answer, Claim, OverCapError, judge_path
-from seqopt.instances.instance import Instance, _Cap
+from seqopt.instances.model import Instance, _Cap
 from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._answers import Found, _proven, called, check_run, with_numbers

@@ -14,7 +14,7 @@ from seqopt._files import parse_json, read_text
 from seqopt.errors import ProblemError
 from seqopt.instances._files import read_instance
 from seqopt.instances._judge import Answer, Claim, judge_path
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import short
 

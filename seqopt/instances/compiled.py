@@ -20,7 +20,7 @@ from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, Graph, _on_paths, _Target, contracted
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
-from seqopt.instances.instance import Instance, _by_goal, _Cap
+from seqopt.instances.model import Instance, _by_goal, _Cap
 from seqopt.plan.solve import graph_of, without_shares
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import Aim, Problem

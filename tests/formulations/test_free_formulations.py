@@ -17,7 +17,7 @@ from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, f
 from seqopt.graph.graph import _on_paths, _Target, fewest_moves, path_values
 from seqopt.graph.space import Explorer, Moves, Space
 from seqopt.graph.states import build_states
-from seqopt.instances.instance import Instance, _Cap
+from seqopt.instances.model import Instance, _Cap
 from seqopt.problem.problem import Aim
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability.assessment import Verdict

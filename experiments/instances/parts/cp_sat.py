@@ -8,7 +8,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.instances._program import Program, program
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 
 FINEST = 1e9  # parts of the largest amount, where whole numbers are asked
 PARTS = (1, 2, 5, 10, 20, 50, 100, 1000)

@@ -17,7 +17,7 @@ import pandas as pd
 from experiments.harness.results import RESULTS, save_table, stored
 from seqopt import read_instance
 from seqopt._cli.main import main
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 
 HOME = Path(__file__).resolve().parent.parent / "library"
 KNOWN = HOME.parent / "known.json"  # best known paths, values and bounds, and who found them

@@ -11,7 +11,7 @@ from seqopt._cli.signatures import Call
 from seqopt.errors import SolverError
 from seqopt.instances._files import read_instance
 from seqopt.instances.answers import judge_instance
-from seqopt.instances.instance import Instance
+from seqopt.instances.model import Instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 

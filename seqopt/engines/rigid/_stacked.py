@@ -80,7 +80,8 @@ class StackedOperator(ComplianceOperator):
 
     def of_loads(self, name: str) -> Floats:
         if name not in self._made:
-            self._made[name] = np.concatenate([each._of_loads(name) for each in self.parts])
+            every = np.concatenate([each._of_loads(name) for each in self.parts])
+            self._made[name] = frozen(every)
         return self._made[name]
 
 
