@@ -170,29 +170,30 @@ def _arcs(columns: Sequence[Blocks], beside: Sequence[Blocks]) -> tuple[Rows, Ro
 class Layers:
     """The costs of the candidates of all moves of a problem with open grips.
 
-    ``moves``: of the schedule; ``steps``: of every step the moves that are open, -1 before the
-    first, and what their choices cost, (C,) or (C, D), infinite where they are not allowed;
-    ``charged``: the same as a search of one move alone is charged.
+    ``moves``: of the schedule; ``steps``: of every open step the moves that are open, and what
+    their choices cost, (C,) or (C, D), infinite where they are not allowed; ``charged``: the same
+    as a search of one move alone is charged; ``given``: of other steps, before the first move.
     """
 
     moves: Sequence[Move]
     steps: Sequence[Step]
     charged: Sequence[Step]
+    given: Sequence[Step]
 
     @cached_property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build counts."""
-        return self.joined(np.add, self.steps)
+        return self.joined(np.add, [*self.steps, *self.given])
 
     @cached_property
     def peaks(self) -> LayeredCosts:
         """The costs of which the largest counts."""
-        return self.joined(np.maximum, self.steps)
+        return self.joined(np.maximum, [*self.steps, *self.given])
 
     @cached_property
     def alone(self) -> LayeredCosts:
         """The sums that a search of one move alone is charged."""
-        return self.joined(np.add, self.charged)
+        return self.joined(np.add, [*self.charged, *self.given])
 
     def joined(self, join: np.ufunc, steps: Sequence[Step]) -> LayeredCosts:
         """Return costs of single choices and of pairs from those of steps."""
@@ -224,4 +225,4 @@ def cost_layers(problem: Problem | States) -> Layers:
     first = len(moves[0].candidates)
     given = [graph.values(*each)[0][0, 0] for each in space.without_choice()]
     alike = [((-1, 0), np.full((1, first), cost)) for cost in given]
-    return Layers(moves, steps + alike, every + alike)
+    return Layers(moves, steps, every, alike)
