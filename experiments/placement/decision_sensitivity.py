@@ -183,7 +183,7 @@ class Costs:
         engine = ComplianceEngine(build_network(scene))
         graph = graph_of(pose(engine, self.schedule, EQUATIONS, limits=EVERY))
         moves, first = self.schedule.moves, len(self.schedule.moves[0].candidates)
-        own, alone = ({c.name: list[Step]() for c in self.criteria} for _ in range(2))
+        own, alone, given = ({c.name: list[Step]() for c in self.criteria} for _ in range(3))
         for level, states in self.batches:  # few large ones
             graph.seen(level, states)
         for level, choices in self.choices:
@@ -196,9 +196,8 @@ class Costs:
             seen = graph.seen(*each)
             for c in self.criteria:
                 cost = 0.0 if isinstance(c, RankSum) else c.costs(seen.responses, seen.bricks, 1)[0]
-                for found in (own, alone):
-                    found[c.name].append(((-1, 0), np.full((1, first), cost)))
-        return {name: Layers(moves, own[name], alone[name]) for name in own}
+                given[c.name].append(((-1, 0), np.full((1, first), cost)))
+        return {name: Layers(moves, own[name], alone[name], given[name]) for name in own}
 
 
 def step_costs(

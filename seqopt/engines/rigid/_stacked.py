@@ -54,11 +54,13 @@ class StackedOperator(ComplianceOperator):
 
     @cached_property
     def inner(self) -> tuple[Ints, Floats]:
+        """The inner edges of bricks (Wb,) and their directions (Wb, 3), scenario by scenario."""
         edges, axes = zip(*(each.inner for each in self.parts), strict=True)
         return frozen((np.concatenate(edges), np.concatenate(axes)))
 
     @cached_property
     def doubts(self) -> Doubts:
+        """What rounding may leave of the answers, (WB,)."""
         own = np.arange(len(self.flexibility))
         diagonal = self.flexibility[own, own % self._rows]
         return Doubts(diagonal, self.dead_displacement, self.loss)
