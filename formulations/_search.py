@@ -36,7 +36,7 @@ WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
 WIDER = 4  # how many times as wide the second narrow search is
-FAR_BELOW = 1.2  # what the narrow search finds, over the first threshold
+FAR_BELOW = 1.2  # what the narrow search finds, over the first threshold; squared as dives succeed
 LARGE = 20_000  # states of a cut from which on any of the best paths is enough, not the first
 NARROW = 1.005  # from a target to the incumbent, below which no other target is set
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
@@ -235,7 +235,7 @@ class ThresholdSearch:
         caps: Sequence[float] = (),
         growth: float = 1.1,
     ) -> None:
-        self._caps, self._growth = caps, growth
+        self._caps, self._growth, self._far = caps, growth, FAR_BELOW
         self._peak = space.peaks[0]
         self._cuts = self._peak and not caps
         self.wide = Explorer(space, tell=tell)
@@ -284,6 +284,7 @@ class ThresholdSearch:
             if self._cuts and self._dives(threshold, below):
                 if self.is_best and self.incumbent:
                     return self.incumbent
+                self._far **= 2  # what succeeds leads on faster
                 threshold = below = self._target
                 continue
             nothing = None
@@ -297,6 +298,7 @@ class ThresholdSearch:
             self.bound = max(self.bound, min(lower, self._ceiling))
             if self.incumbent and lower >= strictly_below(below):
                 if below < self._ceiling:
+                    self._far = FAR_BELOW
                     threshold = below = self._target
                     continue
                 if all(map(le, self.incumbent.objective[1:], self.floors[1:])):
@@ -336,7 +338,7 @@ class ThresholdSearch:
     @property
     def _target(self) -> float:
         """Upper limit of the next incumbent: halfway to the bound, or any better one near it."""
-        middle = (max(self.bound, self._ceiling / FAR_BELOW) * self._ceiling) ** 0.5
+        middle = (max(self.bound, self._ceiling / self._far) * self._ceiling) ** 0.5
         return middle if middle * NARROW < self._ceiling else self._ceiling
 
     def _dives(self, threshold: float, below: float) -> bool:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -226,8 +227,8 @@ def _best_moves(graph: Graph, goal: int) -> tuple[Bools, float]:
 
 
 def tied(value: float) -> float:
-    """Return the largest value that equals this one up to rounding."""
-    return value + TIED * abs(value)
+    """Return the largest value that equals this one up to rounding; an infinite one is itself."""
+    return value + TIED * abs(value) if isfinite(value) else value
 
 
 def strictly_below(value: float) -> float:

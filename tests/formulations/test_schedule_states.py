@@ -1,6 +1,7 @@
 """States of schedules with open grips, one to four a step: all aims against brute force."""
 
 import re
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 
 import seqopt
+from formulations._search import Options, StopError, search_states
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
 from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
@@ -236,3 +238,20 @@ def test_many_open_grips_at_once_are_solved_as_states():
     assert plans[1].objective["minmax"] == pytest.approx(plans[0].objective["minmax"])
     with pytest.raises(StepError, match="at most two neighboring ones can be; take worst-ratio"):
         build_states(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")
+
+
+def test_a_search_that_ends_early_keeps_its_plan_and_a_bound_that_is_a_number():
+    """No floor of its worst step is known before: that must not become a bound that is none."""
+    problem, found = build_states(*built("three-robot"), ONES, "minmax"), []
+    for calls in range(1, 400, 7):
+        left = iter(range(calls))
+
+        def tell(_, left=left):
+            if next(left, None) is None:
+                raise StopError("time")
+
+        with suppress(TimeUpError):
+            found.append(search_states(problem, Options(2, 1.1, dear=False), tell))
+    assert {each.stopped for each in found} == {"", "time"}
+    best = min(each.objective for each in found)
+    assert all(each.bound[0] <= best[0] <= each.objective[0] for each in found)  # NaN is not
