@@ -36,7 +36,8 @@ WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
 WIDER = 4  # how many times as wide the second narrow search is
-FAR_BELOW = 1.2  # what the narrow search finds, over the first threshold; squared as dives succeed
+FAR_BELOW = 1.2  # an incumbent over the next target; its square after a dive that succeeds
+FARTHEST = 1e3  # the same at most
 LARGE = 20_000  # states of a cut from which on any of the best paths is enough, not the first
 NARROW = 1.005  # from a target to the incumbent, below which no other target is set
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
@@ -284,7 +285,7 @@ class ThresholdSearch:
             if self._cuts and self._dives(threshold, below):
                 if self.is_best and self.incumbent:
                     return self.incumbent
-                self._far **= 2  # what succeeds leads on faster
+                self._far = min(self._far**2, FARTHEST)
                 threshold = below = self._target
                 continue
             nothing = None

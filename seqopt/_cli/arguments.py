@@ -34,7 +34,8 @@ RENAMED = {"--criteria": "--criterion"}  # older words for options, which still 
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
-SCHEDULE = re.compile(r"unrecognized arguments: (free|loop|[a-z]+-(?:robot|sequential))\b")
+METHODS = Later("seqopt.sequence.methods")  # of a wrong word alone
+WORD = re.compile(r"unrecognized arguments: (\w[\w-]*)")
 LEADS = {"limit": "limits", "option": "options", "round": "rounding"}
 NAMES = "begin criterion curing direction durations engine grips holds lost measured missing"
 NAMES += " mortar payload props reference robots rules stands to vary"
@@ -56,7 +57,8 @@ def _nearest(message: str, options: Iterable[str]) -> str:
     """
     if found := WRONG_CHOICE.search(message):
         return did_you_mean(found[1], [word.strip(" '") for word in found[2].split(",")])
-    if "--schedule" in options and (found := SCHEDULE.search(message)):
+    found = WORD.search(message)
+    if "--schedule" in options and found and found[1] in (*METHODS.SCHEDULES, "free"):
         return f" (did you mean --schedule {found[1]}?)"
     found = UNKNOWN.search(message)
     if found is None:

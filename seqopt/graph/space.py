@@ -140,7 +140,7 @@ class Space(ABC):
 NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
 ARRAYS = ("values", "mark", "exact", "floor", "spent", "to_go")  # of a part, a row for every state
 FEW = 8  # states that a dive visits at once at first
-TURNS = 5  # of a dive, over the levels: with 2 of 85 bricks it misses plans, and all is visited
+TURNS = 5  # of a dive, over the levels; with 2 it misses plans, and far more states are visited
 BAND = 1e-5  # share of a value within which six digits do not decide
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 """Returns values, feasibility, and from which value of the first goal on they are lower bounds."""
