@@ -372,7 +372,7 @@ class ScenarioSets:
         if self._stacked is None or len(parts) < 2:
             return
         first, grips = sets[parts[0]], (held > 0).sum(axis=1)
-        for count in np.unique(grips).tolist():
+        for count in np.unique(grips[grips > 0]).tolist():
             every = first._number[held[grips == count, held.shape[1] - count :]]
             codes = first._codes(every)
             _, new = np.unique(codes, return_index=True)

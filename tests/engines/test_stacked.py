@@ -82,3 +82,12 @@ def test_a_filled_cache_answers_without_another_solve():
         for got, right in zip(own.answers(6, held), fresh, strict=True):
             np.testing.assert_allclose(got, right, rtol=1e-8, atol=1e-12)
     assert [each.solved for each in sets] == [3] * 4
+
+
+def test_sets_without_grips_or_responses_fill_nothing():
+    made = engines("arch25")
+    sets, held = [GripSets(each, ()) for each in made], np.array([[0, 0], [0, 3]])
+    for _ in range(2):
+        ScenarioSets(made).fill(range(4), sets, 6, held)
+        for own in sets:
+            assert own.answers(6, held)[0].shape == (2, 0)
