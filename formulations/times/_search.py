@@ -97,23 +97,20 @@ class Waits:
 def of_instance(instance: Any, least: Least, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed if instance.asks_time else None
-    if timed is None and not instance.resources:
+    if timed is None:
         raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
     own = {PEAK: MINMAX, TIME: makespan}
     aims = tuple(own.get(goal.kind, SUM) for goal in instance.goals)
     caps = [makespan if cap.column is None else SUM for cap in instance.caps]
     asked = Goals((*aims, *caps), aims, tuple(cap.most for cap in instance.caps))
-    graph = instance.asked if timed is None else timed.graph
-    visited = Visited(graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
-    levels = instance.levels if timed is None else timed.levels
-    carrying = Carrying(graph, levels, timed, instance.resources, instance.steps)
+    visited = Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),))
+    carrying = Carrying(timed.graph, timed.levels, timed)
     stages = Stages(asked, visited, least, watch, carrying)
     try:
         found = stages.run()
     except StopError as stop:
         return plan_by_then(None, stop)
-    end = np.nan if timed is None else stages.least(found.path)
-    values = _timed_values(aims, stages.values(found.path), end)
+    values = _timed_values(aims, stages.values(found.path), stages.least(found.path))
     states, late = tuple((node,) for node in found.path), "time" * found.late
     proofs, bounds = tuple(found.proofs), _no_higher(found.bounds, values)
     return Solution(states, values, bounds, stopped=late, proofs=proofs)

@@ -26,7 +26,6 @@ from seqopt.exchange._content import (
     entry,
     listing,
     mapping,
-    moved,
     number,
 )
 from seqopt.exchange._meshes import object_content
@@ -38,34 +37,28 @@ from seqopt.sequence.steps import Step, StepKind
 def _placed(source: str, held: Entry, elements: dict[str, tuple[str, Entry]]) -> dict[str, Floats]:
     """Return the transformation of every element, groups too, to the model's world.
 
-    Its own is relative to its parent in the tree, and the first of them to the model's.
+    Its own is relative to its parent in the tree, the first of them to the model's; parents come
+    first.
     """
     own = {
         guid: transformation_of(f"{where}: transformation", item.get("transformation"))
         for guid, (where, item) in elements.items()
     }
     world = transformation_of(f"{source}: transformation", held.get("transformation"))
-    placed = dict[str, Floats]()
-    for guid, parent in _tree(source, held):
-        if guid not in elements or guid in placed:
-            why = "occurs twice" if guid in placed else "is not there"
-            raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
-        placed[guid] = (world if parent is None else placed[parent]) @ own[guid]
-    return {guid: world @ each for guid, each in own.items()} | placed
-
-
-def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
-    """Yield the identifiers of elements and of their parents, parents first."""
-    tree = held_by(f"{source}: tree", held.get("tree") or {})
-    waiting: list[tuple[Any, str | None]] = [(tree.get("root") or {}, None)]
+    placed, tree = dict[str, Floats](), held_by(f"{source}: tree", held.get("tree") or {})
+    waiting: list[tuple[Any, Floats]] = [(tree.get("root") or {}, world)]
     while waiting:
         node, above = waiting.pop()
         guid = mapping(f"{source}: a node of the tree", node).get("element")
         if guid is not None:
-            yield str(guid), above
-            above = str(guid)
+            guid = str(guid)
+            if guid not in elements or guid in placed:
+                why = "occurs twice" if guid in placed else "is not there"
+                raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
+            placed[guid] = above = above @ own[guid]
         children = listing(f"{source}: children in the tree", node.get("children") or [])
         waiting += [(child, above) for child in children]
+    return {guid: world @ each for guid, each in own.items()} | placed
 
 
 def read_assembly(document: Any, source: str) -> Content:
@@ -73,11 +66,14 @@ def read_assembly(document: Any, source: str) -> Content:
     graph, meshes = assembly_graph(document, source)
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = held_by(source, graph.get("node_attributes") or graph.get("dva") or {})
-    keys = [key for key in nodes if meshes is None or key in meshes]
-    blocks = []
+    keys, blocks = [key for key in nodes if meshes is None or key in meshes], list[FileBlock]()
     for key in keys:
-        node = common | mapping(source, nodes[key])
-        blocks.append(_node_block(f"{source}: block {key}", key, node, meshes))
+        node, where = common | mapping(source, nodes[key]), f"{source}: block {key}"
+        held = meshes[key] if meshes is not None else entry(where, node, "block")
+        vertices, faces = solid_of(where, held)
+        course, support = node.get("course", node.get("order")), node.get("is_support") is True
+        course = None if course is None else number(f"{where}: course", course)
+        blocks.append(FileBlock(key, vertices, faces, support=support, course=course))
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
     return Content(tuple(blocks), said=tuple(said))
 
@@ -93,19 +89,6 @@ def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | 
     if "node" not in held:
         raise SceneError(f"{source}: neither graph nor node is there; give an assembly")
     return held, None
-
-
-def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None) -> FileBlock:
-    held = meshes[key] if meshes is not None else entry(where, node, "block")
-    vertices, faces = solid_of(where, held)
-    course = node.get("course", node.get("order"))
-    return FileBlock(
-        key,
-        vertices,
-        faces,
-        support=node.get("is_support") is True,
-        course=None if course is None else number(f"{where}: course", course),
-    )
 
 
 def read_model(document: Any, source: str) -> Content:
@@ -137,7 +120,8 @@ def read_model(document: Any, source: str) -> Content:
             vertices, faces = solid_of(at, entry(at, own, "geometry", "shape"))
             density = densities.get(str(own.get("material")))
             about: Any = {"support": own.get("is_support") is True, "density": density}
-            blocks.append(FileBlock(str(i), moved(vertices, placed[guid]), faces, **about))
+            points = vertices @ placed[guid][:3, :3].T + placed[guid][:3, 3]
+            blocks.append(FileBlock(str(i), points, faces, **about))
     if len(blocks) < len(rows):
         said.append(f"{len(rows) - len(blocks)} groups only place what is in them")
     return Content(tuple(blocks), said=tuple(said))

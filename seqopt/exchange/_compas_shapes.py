@@ -108,18 +108,13 @@ def transformation_of(where: str, value: Any) -> Floats:
     return np.array(matrix)
 
 
-def typed(kind: str, data: object) -> Document:
-    """Return data as COMPAS stores a value of a type."""
-    return {"dtype": kind, "data": data}
-
-
 def compas_frame(frame: Frame | None) -> Document | None:
     """Return a frame; None where there is none."""
     if frame is None:
         return None
     rows = {"point": frame.point, "xaxis": frame.xaxis, "yaxis": frame.yaxis}
     data = {name: [round(x, _DIGITS) + 0.0 for x in row] for name, row in rows.items()}
-    return typed("compas.geometry/Frame", data)
+    return {"dtype": "compas.geometry/Frame", "data": data}
 
 
 def mesh_data(points: Floats, faces: Sequence[Iterable[int]]) -> Document:

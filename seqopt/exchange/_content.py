@@ -170,8 +170,3 @@ def point(where: str, value: object) -> Floats:
     if len(row) != 3:
         raise SceneError(f"{where} is {short(value)}; three numbers are expected")
     return np.array([number(where, x) for x in row])
-
-
-def moved(place: Floats, matrix: Floats) -> Floats:
-    """Return points (k, 3) after a transformation (4, 4)."""
-    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])

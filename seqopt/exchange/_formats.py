@@ -10,7 +10,7 @@ from typing import Any
 
 from seqopt._files import read_text
 from seqopt._registry import Part, registered
-from seqopt.errors import SceneError
+from seqopt.errors import FileError, SceneError
 from seqopt.exchange._boxes import read_boxes
 from seqopt.exchange._compas_models import (
     assembly_with_plan,
@@ -167,6 +167,8 @@ def writable() -> list[str]:
 
 def read_file(path: Path, form: str | None = None) -> Content:
     """Return the content of a file, in the format of a name; by default in that of its ending."""
+    if path.is_dir():
+        raise FileError(f"{path} is a folder; give a file with all blocks, as .obj")
     suffix, known = path.suffix.lower().removeprefix("."), formats()
     fitting = (each for each in (*known.values(), JSON) if each.read and suffix in each.endings)
     found = next(fitting, None) if form is None else known.get(form)

@@ -60,11 +60,6 @@ class Held:
     away: Vector  # unit vector along which the brick comes free of what stands when it is placed
 
 
-def brick_frame(brick: Brick) -> Frame:
-    """Return the frame of a brick, from its centroid along length and width."""
-    return Frame(brick.position, brick.length_axis, brick.width_axis)
-
-
 def hold(scene: Scene, robot: Robot, node: int) -> Held:
     """Return how a robot holds one of the scene's nodes."""
     brick = scene.brick_of_node[node]
@@ -92,7 +87,8 @@ def hold(scene: Scene, robot: Robot, node: int) -> Held:
         tried = np.vstack([mean / np.linalg.norm(mean), tried])
     worst = (-tried @ now.T).min(axis=1, initial=1.0)
     away = tried[int((worst >= worst.max() - 1e-9).argmax())]
-    return Held(brick_frame(brick), grip, float(depths[best]), as_vector(away))
+    block = Frame(brick.position, brick.length_axis, brick.width_axis)
+    return Held(block, grip, float(depths[best]), as_vector(away))
 
 
 def _faces_seen(brick: Brick, at: Floats) -> tuple[Floats, Floats]:

@@ -20,8 +20,8 @@ from seqopt._files import csv_text
 from seqopt._registry import Later
 from seqopt.arms._plan_postures import PlanPostures, plan_postures
 from seqopt.errors import ExtraError, SceneError
-from seqopt.exchange._compas_shapes import compas_frame, mesh_data, typed
-from seqopt.exchange._grip_frames import Frame, Held, brick_frame, hold
+from seqopt.exchange._compas_shapes import compas_frame, mesh_data
+from seqopt.exchange._grip_frames import Frame, Held, hold
 from seqopt.scene._checks import as_vector, positive
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Robot, Sphere
@@ -202,8 +202,11 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
             {
                 "block": brick.name,
                 "mass": brick.mass,
-                "frame": compas_frame(brick_frame(brick)),
-                "shape": typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick))),
+                "frame": compas_frame(Frame(brick.position, brick.length_axis, brick.width_axis)),
+                "shape": {
+                    "dtype": "compas.datastructures/Mesh",
+                    "data": mesh_data(*vertices_of(brick)),
+                },
             }
             for brick in scene.placed
         ],

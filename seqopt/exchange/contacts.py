@@ -53,11 +53,6 @@ def _polygons(shape: Any) -> list[Any]:
     return [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == "Polygon"]
 
 
-def _valid(corners: Floats) -> Any:
-    """Return corners (m, 2) as a polygon, or polygons where they cross themselves."""
-    return SHAPELY.make_valid(SHAPELY.Polygon(corners))
-
-
 def _merged(pieces: list[Any], grain: float) -> list[Any]:
     """Return convex polygons united as long as two of them have a convex union."""
     pieces = sorted(pieces, key=lambda piece: -piece.area)
@@ -96,11 +91,6 @@ _Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
 _Facets = tuple[list[Floats], Floats, Floats]  # corners of faces, normals outward, and middles
 
 
-def _require_polygons() -> None:
-    if find_spec("shapely") is None:
-        raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
-
-
 def touching_faces(
     shapes: Sequence[_Shape], gap: float, progress: Tell | None = None
 ) -> tuple[_Held, ...]:
@@ -115,7 +105,8 @@ def touching_faces(
     which they may interpenetrate, m; ``progress``: called with how far it is, once it takes longer
     than a second. Raises `FileError` if shapely is not installed.
     """
-    _require_polygons()
+    if find_spec("shapely") is None:
+        raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
     gap = positive("gap", gap, "m")
     facets = list[_Facets]()
     for shape in shapes:
@@ -165,7 +156,7 @@ def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: f
     """Return the overlap of two faces (m, 3), seen along a normal, if they are near all over it."""
     origin, axes = plane
     seen = [(face - origin) @ axes.T for face in (first, second)]
-    one, other = (_valid(face[:, 1:]) for face in seen)
+    one, other = (SHAPELY.make_valid(SHAPELY.Polygon(face[:, 1:])) for face in seen)
     common = one.intersection(other)
     if not common.area > _SLIVER * min(one.area, other.area):
         return []
@@ -258,7 +249,6 @@ def _find_contacts(
 
     Places are those of the file; the ground, which blocks not built belong to, comes first.
     """
-    _require_polygons()
     facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
     said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = list[_Held]()

@@ -7,9 +7,9 @@ import warnings
 from pathlib import Path
 
 from seqopt._files import read_table, read_text
-from seqopt.errors import FileError, SceneError, SceneWarning, StepError
+from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
-from seqopt.exchange._content import Content, Given
+from seqopt.exchange._content import Given
 from seqopt.exchange._formats import read_file
 from seqopt.scene._checks import LARGEST_NUMBER, printable, short
 from seqopt.scene.scenarios import SAME
@@ -62,7 +62,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     if not isinstance(given, Given | None):
         raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)
-    content = read_content(where, form)
+    content = read_file(where, form)
     scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
     warn_of(scene, scene.name)
     low = {ground.brick for ground in scene.grounds}
@@ -75,13 +75,6 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
             stacklevel=2,
         )
     return scene
-
-
-def read_content(path: Path, form: str | None = None) -> Content:
-    """Return what a file says, in the format of a name; by default in that which it looks like."""
-    if path.is_dir():
-        raise FileError(f"{path} is a folder; give a file with all blocks, as .obj")
-    return read_file(path, form)
 
 
 def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:

@@ -10,21 +10,18 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, _Target, _target_sums, tied
+from seqopt.graph.graph import PEAK, TAIL, TIME, _Target, _target_sums, tied
 from seqopt.instances.model import Instance
 from seqopt.judge.arithmetic import (
     ABOVE,
-    Closed,
     Labelled,
     Stage,
-    TwinBook,
     _peak_bound,
     _sum_bound,
     least_within,
     limit_below,
 )
 from seqopt.judge.certificate import TOLERANCE, Certificate, _path_twin
-from seqopt.problem.requirements import _first_fault
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,9 +109,6 @@ def _walked(instance: Instance, answer: Answer) -> tuple[Ints, Ints | None]:
         at = int(instance.target[arc])
     if not instance.ends[at]:
         raise SolverError(f"the path stops at node {at}, where none may end")
-    every = instance.steps if instance.resources else None
-    if every is not None and (fault := _first_fault(instance.resources, every.only(arcs))):
-        raise SolverError(f"the resource {fault[0]} is not kept up to step {fault[1] + 1}")
     return arcs, numbers if what == "acts" else None
 
 
@@ -145,7 +139,8 @@ def _bounds(
     """
     if len(claims) > len(values):
         raise SolverError(f"there are {len(claims)} bounds for {len(values)} goals")
-    stage, out, said = first_stage(instance), list[float](), list[float]()
+    caps = [(c.name, c.column, tied(c.most)) for c in instance.caps if c.column is not None]
+    stage, out, said = Stage(instance.graph, tuple(caps)), list[float](), list[float]()
     for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
         claim, slack = claims[k] if k < len(claims) else Claim(), ABOVE * abs(value)
         bound = proven(instance, stage, goal, claim, value)
@@ -165,12 +160,6 @@ def _bounds(
     return tuple(out), tuple(said)
 
 
-def first_stage(instance: Instance) -> Stage:
-    """Return all arcs, with the caps."""
-    caps = [(c.name, c.column, tied(c.most)) for c in instance.caps if c.column is not None]
-    return Stage(instance.graph, tuple(caps))
-
-
 def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
     """Return the lower bound of a goal by the proof of a claim, or by the judge's own without one.
 
@@ -188,50 +177,23 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
         if not price >= 0 or not np.isfinite(price):
             raise SolverError(f"price of {name!r} is {price:g}; give a number from 0")
     prices = [claim.prices.get(name, 0.0) for name in known]
-    if instance.resources and claim.labels is not None and goal.kind in (SUM, PEAK):
-        return _by_labels(instance, stage, goal, claim)
     if goal.kind == PEAK:
         return _peak_bound(stage, goal, claim.value if claim.prices else None, prices)
     if goal.kind == TIME:
         twin = _path_twin()
         return -np.inf if twin is None else twin.claimed(instance, stage, claim, prices)
-    costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
-    if goal.kind == TAIL or not stage.limited:
-        return _sum_bound(stage, costs, prices)
-    labels = instance.is_layered
-    return least_within(stage.graph, costs, stage.caps(), value, prices, labels=labels)
-
-
-def _weights(goal: _Target, claim: Claim) -> Floats:
-    """Return weights of the columns of a tail that prove a bound, or say why they do not."""
     count, weights = len(goal.columns), claim.weights
     if weights is None or goal.kind != TAIL:
-        return np.full(count, 1 / count)
-    if weights.shape != (count,) or not (weights >= 0).all():
+        weights = np.full(count, 1 / count)
+    elif weights.shape != (count,) or not (weights >= 0).all():
         raise SolverError(f"weights: give {count} numbers from 0")
-    if weights.sum() > 1 + 1e-9 or weights.max() > goal.most * (1 + 1e-9):
+    elif weights.sum() > 1 + 1e-9 or weights.max() > goal.most * (1 + 1e-9):
         raise SolverError(
             f"weights: they add up to {weights.sum():.9g}, the largest is {weights.max():.9g}; at "
             f"most 1 in all and {goal.most:.9g} each prove a bound"
         )
-    return weights
-
-
-def _by_labels(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
-    """Return the claimed bound of a goal; a `SolverError` if labels of resources do not close."""
-    assert claim.labels is not None
-    twins = [each.twin for each in instance.resources if each.twin is not None]
-    if claim.value is None or len(twins) < len(instance.resources):
-        return -np.inf  # without a twin nothing is proven
-    part, (state, values) = stage.below(goal, claim.value), claim.labels
-    graph, move = part.graph, np.arange(len(part.graph.source))
-    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
-    own = graph.source.astype(np.int64) * graph.states + graph.target
-    steps = instance.steps.only(np.searchsorted(codes, own))
-    books = part.books(goal, claim.value, move)
-    closed = Closed(graph, move, [*books, *(TwinBook(twin, steps) for twin in twins)])
-    values = values if len(values) else np.zeros((0, closed.width))
-    named = len(state) == 0 or (state.min() >= 0 and state.max() < instance.nodes)
-    if named and values.shape == (len(state), closed.width) and closed.is_proof((state, values)):
-        return claim.value
-    raise SolverError(f"{goal.name}: labels do not prove that no path is below {claim.value:.9g}")
+    costs = stage.graph.amounts[:, list(goal.columns)] @ weights
+    if goal.kind == TAIL or not stage.limited:
+        return _sum_bound(stage, costs, prices)
+    limited, labels = stage.caps(), instance.is_layered
+    return least_within(stage.graph, costs, limited, value, prices, labels=labels)

@@ -9,14 +9,12 @@ largest weight. When acts end is no part of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL
 from seqopt.instances.model import Instance
@@ -39,137 +37,108 @@ class Program(NamedTuple):
     rows: list[str]
 
 
+class _Rows(NamedTuple):
+    """Rows of the program between limits, one for each or one of all."""
+
+    names: list[str]
+    entries: sparse.csr_array
+    low: Floats | float
+    high: Floats | float = np.inf
+
+
 def as_mps(instance: Instance) -> str:
     """Return the program in free MPS; further goals are rows of type N after the first."""
-    found = program(instance)
-    made_by, goals = instance.facts.get("made_by", ""), [goal.name for goal in instance.goals]
-    said = [
-        f"* seqopt instance {instance.name}: {', '.join(goals)}",
-        *([f"* {made_by}"] * bool(made_by)),
+    found, made_by = program(instance), instance.facts.get("made_by", "")
+    lines = [
+        f"* seqopt instance {instance.name}: {', '.join(goal.name for goal in instance.goals)}"
     ]
+    lines += [f"* {made_by}"] if made_by else []
+    lines.append("NAME " + "".join(c if c.isalnum() else "_" for c in instance.name))
     bounded = np.isfinite(found.low)
     kinds = np.where(bounded, "G", np.where(np.isfinite(found.high), "L", "N"))
     kinds[found.low == found.high] = "E"
     right = np.where(kinds == "N", 0.0, np.where(bounded, found.low, found.high))
-    lines = [*said, "NAME " + "".join(c if c.isalnum() else "_" for c in instance.name)]
     lines += ["ROWS", " N goal_0"]
     lines += [f" {kind} {name}" for kind, name in zip(kinds, found.rows, strict=True)]
-    lines += ["COLUMNS", *_columns(found), "RHS"]
-    lines += [f" RHS {found.rows[k]} {float(right[k])!r}" for k in np.flatnonzero(right)]
-    lines.append("BOUNDS")
-    for name, upper, whole in zip(found.names, found.upper.tolist(), found.whole, strict=True):
-        lines += [f" BV BND {name}"] if whole else []
-        lines += [f" UP BND {name} {upper!r}"] if np.isfinite(upper) and not whole else []
-    return "\n".join([*lines, "ENDATA", ""])
-
-
-def _columns(found: Program) -> Iterator[str]:
-    """Yield the entries of variables, those that are whole numbers, which come first, marked."""
-    whole, rows = int(found.whole.sum()), ["goal_0", *found.rows]
+    lines += ["COLUMNS", " MARKER 'MARKER' 'INTORG'"]  # whole numbers come first
+    rows, whole = ["goal_0", *found.rows], int(found.whole.sum())
     entries = sparse.vstack([sparse.csr_array(found.cost[None]), found.matrix]).tocsc()
-    yield " MARKER 'MARKER' 'INTORG'"
-    for j, name in enumerate(found.names):
-        if j == whole:
-            yield " MARKER 'MARKER' 'INTEND'"
-        part = slice(entries.indptr[j], entries.indptr[j + 1])
-        for row, value in zip(entries.indices[part], entries.data[part].tolist(), strict=True):
-            yield f" {name} {rows[row]} {value!r}"
-    if whole == len(found.names):
-        yield " MARKER 'MARKER' 'INTEND'"
-
-
-@dataclass
-class _Draft:
-    """Rows of the program under construction."""
-
-    at: list[tuple[Ints, Ints, Floats]] = field(default_factory=list)
-    low: list[Floats] = field(default_factory=list)
-    high: list[Floats] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-
-    def add(
-        self,
-        name: str,
-        rows: Ints | int,
-        columns: Ints | int,
-        values: Floats | float,
-        low: Floats | float,
-        high: Floats | float = np.inf,
-    ) -> None:
-        """Add rows: their entries by row from 0 and column, and limits, one for every row."""
-        entries = np.broadcast_arrays(len(self.names) + np.atleast_1d(rows), columns, values)
-        limits = np.broadcast_arrays(np.atleast_1d(low), high)
-        self.at.append((entries[0], entries[1], entries[2]))
-        self.low.append(limits[0])
-        self.high.append(limits[1])
-        count = len(limits[0])
-        self.names += [name] if count == 1 else [f"{name}_{k}" for k in range(count)]
+    for j, name in enumerate(found.names, start=1):
+        part = slice(entries.indptr[j - 1], entries.indptr[j])
+        own = zip(entries.indices[part], entries.data[part].tolist(), strict=True)
+        lines += [f" {name} {rows[row]} {value!r}" for row, value in own]
+        lines += [" MARKER 'MARKER' 'INTEND'"] if j == whole else []
+    lines.append("RHS")
+    lines += [f" RHS {found.rows[k]} {float(right[k])!r}" for k in np.flatnonzero(right)]
+    lines += ["BOUNDS", *(f" BV BND {name}" for name in found.names[:whole])]
+    return "\n".join([*lines, "ENDATA", ""])
 
 
 def program(instance: Instance) -> Program:
     """Return the program of the first goal; further goals are unbounded rows."""
     if instance.asks_time:
         raise ProblemError(f"instance {instance.name}: no program has times; give the .npz")
-    arcs, draft, names, at = instance.arcs, _Draft(), list[str](), list[int]()
+    names, firsts, costs = [f"x{k}" for k in range(instance.arcs)], list[int](), list[Floats]()
     for k, goal in enumerate(instance.goals):  # variables besides arcs, and the first of each goal
-        at.append(arcs + len(names))
+        firsts.append(len(names))
         names += [f"t{k}"] if goal.kind == PEAK else []
         if goal.kind == TAIL:
             names += [f"eta{k}", *(f"u{k}_{s}" for s in range(len(goal.columns)))]
-    every = np.arange(arcs)
-    _flow(draft, instance)
-    goals = [_goal(draft, instance, k, at[k], len(names)) for k in range(len(instance.goals))]
+    blocks = _flow(instance, len(names))
+    for k, first in enumerate(firsts):
+        cost, rows = _goal(instance, k, first, len(names))
+        costs.append(cost)
+        blocks += rows
     for k, cap in enumerate(instance.caps):
-        assert cap.column is not None  # as of times alone
-        draft.add(f"cap_{k}", 0, every, instance.amounts[:, cap.column], -np.inf, cap.most)
-    for k, own in enumerate(goals[1:], start=1):
-        used = np.flatnonzero(own)
-        draft.add(f"goal_{k}", 0, used, own[used], -np.inf)
-    rows, columns, values = (np.concatenate(each) for each in zip(*draft.at, strict=True))
-    shape = len(draft.names), arcs + len(names)
-    matrix = sparse.csr_array((values, (rows, columns)), shape=shape)
-    matrix.sum_duplicates()
+        own = np.zeros((1, len(names)))
+        own[0, : instance.arcs] = instance.amounts[:, cap.column or 0]  # None is of times alone
+        blocks.append(_Rows([f"cap_{k}"], sparse.csr_array(own), -np.inf, cap.most))
+    for k, cost in enumerate(costs[1:], start=1):
+        blocks.append(_Rows([f"goal_{k}"], sparse.csr_array(cost[None]), -np.inf))
+    matrix = sparse.vstack([block.entries for block in blocks]).tocsr()
     matrix.eliminate_zeros()
-    whole = np.arange(shape[1]) < arcs
-    limits = np.concatenate(draft.low), np.concatenate(draft.high)
-    named = [*(f"x{k}" for k in every), *names]
-    return Program(
-        named, goals[0], np.where(whole, 1.0, np.inf), whole, matrix, *limits, draft.names
+    low, high = (
+        np.concatenate([np.full(len(block.names), block[at]) for block in blocks]) for at in (2, 3)
     )
+    whole = np.arange(len(names)) < instance.arcs
+    named = [name for block in blocks for name in block.names]
+    return Program(names, costs[0], np.where(whole, 1.0, np.inf), whole, matrix, low, high, named)
 
 
-def _flow(draft: _Draft, instance: Instance) -> None:
-    """Add flow conservation of one unit from node 0 to an end."""
-    source, target, inner = instance.source, instance.target, ~instance.ends
-    number = np.cumsum(inner) - 1
-    leaves, comes = np.flatnonzero(inner[source]), np.flatnonzero(inner[target])
-    rows = np.concatenate([number[source[leaves]], number[target[comes]]])
-    signs = np.repeat([1.0, -1.0], [len(leaves), len(comes)])
-    right = np.zeros(int(inner.sum()))
-    right[0] = 1.0
-    draft.add("flow", rows, np.concatenate([leaves, comes]), signs, right, right)
-    last, went = np.flatnonzero(instance.ends[target]), np.flatnonzero(instance.ends[source])
-    signs = np.repeat([1.0, -1.0], [len(last), len(went)])
-    draft.add("ends", 0, np.concatenate([last, went]), signs, 1.0, 1.0)
+def _flow(instance: Instance, width: int) -> list[_Rows]:
+    """Return flow conservation of one unit from node 0 to an end."""
+    ones, every, inner = np.ones(instance.arcs), np.arange(instance.arcs), ~instance.ends
+    leaves, comes = (
+        sparse.csr_array((ones, (nodes, every)), shape=(instance.nodes, width))
+        for nodes in (instance.source, instance.target)
+    )
+    out, start = leaves - comes, np.zeros(int(inner.sum()))
+    start[0] = 1.0
+    names = [f"flow_{k}" for k in range(len(start))] if len(start) > 1 else ["flow"]
+    last = sparse.csr_array(-out[instance.ends].sum(axis=0)[None])
+    return [_Rows(names, out[inner], start, start), _Rows(["ends"], last, 1.0, 1.0)]
 
 
-def _goal(draft: _Draft, instance: Instance, k: int, first: int, more: int) -> Floats:
-    """Add the rows of a goal, and return its costs; ``first``: its own variable, of so many."""
-    goal, every = instance.goals[k], np.arange(instance.arcs)
-    out = np.zeros(instance.arcs + more)
+def _goal(instance: Instance, k: int, first: int, width: int) -> tuple[Floats, list[_Rows]]:
+    """Return the costs of a goal, and its rows; ``first``: its own variable, of ``width``."""
+    goal, arcs = instance.goals[k], instance.arcs
+    cost, amounts = np.zeros(width), instance.amounts[:, list(goal.columns)]
     if goal.kind == SUM:
-        out[every] = instance.amounts[:, goal.columns[0]]
-    elif goal.kind == PEAK:  # what arcs to a level take, or to a node
-        out[first] = 1.0
+        cost[:arcs] = amounts[:, 0]
+        return cost, []
+    cost[first] = 1.0
+    if goal.kind == PEAK:  # what arcs to a level take, or to a node
         groups = instance.levels[instance.target] if instance.is_layered else instance.target
         own, rows = np.unique(groups, return_inverse=True)
-        ones = np.ones(len(own))
-        columns = np.concatenate([every, np.full(len(own), first)])
-        values = np.concatenate([-instance.amounts[:, goal.columns[0]], ones])
-        draft.add("peak", np.append(rows, np.arange(len(own))), columns, values, 0 * ones)
-    else:
-        out[first], out[first + 1 : first + 1 + len(goal.columns)] = 1.0, goal.most
-        for s, column in enumerate(goal.columns):  # u_s: what a total is above the threshold
-            values = np.append(-instance.amounts[:, column], [1.0, 1.0])
-            draft.add(f"total_{s}", 0, np.append(every, [first, first + 1 + s]), values, 0.0)
-    return out
+        every = np.arange(len(own))
+        at = np.append(rows, every), np.append(np.arange(arcs), np.full(len(own), first))
+        values = np.append(-amounts[:, 0], np.ones(len(own)))
+        entries = sparse.csr_array((values, at), shape=(len(own), width))
+        return cost, [
+            _Rows([f"peak_{k}" for k in every] if len(own) > 1 else ["peak"], entries, 0.0)
+        ]
+    cost[first + 1 : first + 1 + len(goal.columns)] = goal.most
+    total = np.zeros((len(goal.columns), width))  # u_s: what a total is above the threshold
+    total[:, :arcs], total[:, first] = -amounts.T, 1.0
+    np.fill_diagonal(total[:, first + 1 :], 1.0)
+    return cost, [_Rows([f"total_{s}" for s in range(len(total))], sparse.csr_array(total), 0.0)]

@@ -89,16 +89,11 @@ def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: 
     name = formulation.name
     limit = {} if run.left == inf else {"seconds": run.left}
     told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
-    own = deepcopy(replace(instance, resources=()))  # resources are code: they have no data
-    solve = partial(
-        formulation.solve, replace(own, resources=instance.resources), **run.options, **told
-    )
+    solve = partial(formulation.solve, deepcopy(instance), **run.options, **told)
     try:
         with answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, Solution, solve)
     except InfeasibleError as error:
-        if instance.resources:
-            raise InfeasibleError(f"claimed by {name}, and not proven: {error}") from None
         if not instance.caps:
             raise SolverError(
                 f"formulation {name} says that no path is allowed, and some are: {error}"
@@ -129,13 +124,14 @@ def judged(instance: Instance, formulation: Formulation, found: Solution) -> Cer
     except OverCapError as error:
         raise SolverError(f"{error}; use a formulation that keeps budgets exactly") from None
     exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
-    if exact and instance.is_plain and proof.gap > TOLERANCE:
+    plain = not instance.caps and all(goal.kind in (SUM, PEAK) for goal in instance.goals)
+    if exact and plain and proof.gap > TOLERANCE:
         raise SolverError(
             f"{formulation.name} promises the least, and no more than "
             f"{', '.join(f'{b:.9g}' for b in proof.bounds)} is proven"
         )
     said, value = found.bound[0], proof.values[0]
-    if instance.is_plain and said > proof.bounds[0] + TOLERANCE * abs(value):
+    if plain and said > proof.bounds[0] + TOLERANCE * abs(value):
         raise SolverError(f"the claimed bound {said:.9g} exceeds {proof.bounds[0]:.9g}")
     pairs = zip(proof.values, proof.bounds, found.bound, strict=True)
     left = [(v - min(v, max(b, said))) / (abs(v) or 1.0) for v, b, said in pairs]
@@ -157,11 +153,6 @@ def _claims(instance: Instance, found: Solution) -> list[Any]:
                 value = None if labels is None else found.bound[k]
                 own[k] = Claim(value, shares=proof.prices[:, [0, *(1 + firsts)]], labels=labels)
         return own
-    if instance.resources:
-        pairs = zip(found.proofs, found.bound, strict=False)
-        if not all(each.twin for each in instance.resources):
-            return [Claim(bound) for bound in found.bound]
-        return [Claim(b, labels=(proof.states[:, 1], proof.labels)) for proof, b in pairs]
     if kinds == [TAIL]:
         return [Claim(weights=np.array(found.prices[0]))] if found.prices else []
     sums, out = [cap.name for cap in instance.caps], list[Any]()

@@ -13,10 +13,9 @@ from seqopt._registry import Shown, offered
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Formulation, Run, as_formulation, formulations
-from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, Graph, Rows, _Target
+from seqopt.graph.graph import PEAK, TAIL, TIME, Graph, Rows, _Target
 from seqopt.plan.plan import Given, Plan
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import Resource, StepArrays
 from seqopt.sequence.steps import Step
 from seqopt.times._graph import TimedGraph
 
@@ -58,8 +57,6 @@ class Instance(FrozenValue, Given, Shown):
         What a search of one move alone is charged, as of `seqopt.graph.graph.Graph`.
     facts : mapping
         Where it comes from: the command that made it, and the version.
-    resources : tuple of Resource
-        What paths must keep beside; of instances in memory alone, no file has any.
 
     Examples
     --------
@@ -80,7 +77,6 @@ class Instance(FrozenValue, Given, Shown):
     timed: TimedGraph | None = field(default=None, compare=False)
     alone: Floats | None = None
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    resources: tuple[Resource, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         if not self.goals:
@@ -109,8 +105,16 @@ class Instance(FrozenValue, Given, Shown):
         raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
 
     def solved(self, named: Formulation | str | None, run: Run) -> Plan:
-        """Return the path that a formulation finds, judged, as a plan."""
-        found = self.formulation(named)
+        """Return the path that a formulation finds, judged, as a plan.
+
+        A `ProblemError` says which fit if it does not.
+        """
+        names = self.fitting
+        found = as_formulation(named or names[0])
+        if found.name not in names and found.name in formulations():
+            raise ProblemError(
+                f"{found.name}: instance {self.name} does not fit; use {' or '.join(names)}"
+            )
         return Plan(self, self, found, *offered("find_path")(self, found, run))
 
     @property
@@ -118,7 +122,6 @@ class Instance(FrozenValue, Given, Shown):
         """The names of formulations that fit, the default first."""
         every, kinds = formulations(), [goal.kind for goal in self.goals]
         question = "time" if self.asks_time else "tail" if kinds == [TAIL] else "goals"
-        question = "resource" if self.resources else question
         found = [n for n, f in every.items() if f.fits(question, "instance")]
         if kinds[0] != PEAK:
             found = [name for name in found if every[name].aim is not Aim.PEAK]
@@ -127,16 +130,6 @@ class Instance(FrozenValue, Given, Shown):
         usual = ("makespan_labels", "labels" if self.caps else "path_dp", "schedule_search")
         first = next(name for name in usual if name in found)
         return (first, *(name for name in found if name != first))
-
-    def formulation(self, named: Formulation | str | None) -> Formulation:
-        """Return the formulation that chooses from it; a `ProblemError` if it does not fit."""
-        names = self.fitting
-        found = as_formulation(named or names[0])
-        if found.name not in names and found.name in formulations():
-            raise ProblemError(
-                f"{found.name}: instance {self.name} does not fit; use {' or '.join(names)}"
-            )
-        return found
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -182,22 +175,10 @@ class Instance(FrozenValue, Given, Shown):
         return Graph(*rows, peaks, graph.ends, caps, self.alone)
 
     @property
-    def steps(self) -> StepArrays:
-        """Its arcs as resources see them."""
-        rows = self.states[:, 1:]
-        return StepArrays(self.levels[self.target], rows[self.source], rows[self.target])
-
-    @property
     def asks_time(self) -> bool:
         """Whether it counts when acts end."""
         kinds = [goal.kind == TIME for goal in self.goals]
         return any(kinds) or any(cap.column is None for cap in self.caps)
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether every goal is a sum or a largest amount, and nothing is asked beside."""
-        beside = self.caps or self.resources
-        return not beside and all(goal.kind in (SUM, PEAK) for goal in self.goals)
 
     @cached_property
     def is_layered(self) -> bool:

@@ -15,10 +15,11 @@ from seqopt._cli.main import main
 from seqopt.errors import FileError, SceneError, SceneWarning
 from seqopt.exchange._compas_models import read_model
 from seqopt.exchange._content import Given
+from seqopt.exchange._formats import read_file
 from seqopt.exchange._mesh_files import read_obj
 from seqopt.exchange._meshes import repair_shape
 from seqopt.exchange.contacts import face_ground, face_joint, flat_face, touching_faces
-from seqopt.exchange.imports import import_scene, read_content
+from seqopt.exchange.imports import import_scene
 from seqopt.scene._checks import as_vectors
 from seqopt.scene.library.common import MASONRY, _touching_order
 from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
@@ -468,7 +469,7 @@ FILES = {"shared.obj": lambda: shared(SHAPES), "loose.obj": loose}
 def test_an_arch_is_its_bricks_without_names(name, tmp_path):
     path = tmp_path / name
     path.write_text(FILES[name](), "utf-8")
-    blocks = read_content(path).blocks
+    blocks = read_file(path).blocks
     assert [block.key for block in blocks] == [str(i) for i in range(len(SHAPES))]
     for block, shape in zip(blocks, SHAPES, strict=True):
         solid = repair_shape(block).solid

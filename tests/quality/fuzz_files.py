@@ -24,8 +24,9 @@ from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
+from seqopt.exchange._formats import read_file
 from seqopt.exchange.exports import export
-from seqopt.exchange.imports import import_scene, read_content, read_measured
+from seqopt.exchange.imports import import_scene, read_measured
 from seqopt.plan.replan import asked_before
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import with_robots
@@ -114,9 +115,7 @@ def _of_imports() -> Iterator[tuple[str, File]]:
     def brought(path: Path) -> object:
         given = seqopt.exchange.Given(unit="m", density=2000.0)
         return (
-            import_scene(path, given=given)
-            if path.suffix in (".csv", ".json")
-            else read_content(path)
+            import_scene(path, given=given) if path.suffix in (".csv", ".json") else read_file(path)
         )
 
     scene = seqopt.load_scene(RIGHT)

@@ -16,7 +16,6 @@ from seqopt._cli.words import File
 from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError
 from seqopt.instances._files import WRITERS, save_instance
-from seqopt.instances._judge import first_stage
 from seqopt.instances.compiled import instance
 from seqopt.instances.model import Instance
 from seqopt.work.progress import Tell
@@ -60,7 +59,7 @@ def run(
     progress("writing the instance")
     Output(out, words.get("scene"), words.get("schedule")).keep_apart(to)
     save_instance(found, to)
-    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
+    limited = ", ".join(f"{c.name} {c.most:g}" for c in found.caps if c.column is not None)
     lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
     lines += [f"written to {to}; seqopt judge {to} SOLUTION checks an answer"]
     notes = () if out else (f"file: {to}; --out names another, or a folder for every format",)
