@@ -78,20 +78,6 @@ class Answer:
     status: Status = Status.DONE
     scene: Any = None  # of which it is
 
-    def document(self, command: str) -> Any:
-        """Return facts and status of a command, ready for JSON."""
-        said = {
-            "command": command,
-            "seqopt": version("seqopt"),
-            **({} if self.scene is None else {"scene": scene_facts(self.scene)}),
-            **self.facts,
-            "written": self.written,
-            "notes": self.notes,
-            "failures": self.failures,
-            "exit_status": self.status,
-        }
-        return plain(said)
-
 
 def answer_of(result: Any) -> Answer:
     """Return the answer of what a command returns: an answer, a table or a text."""
@@ -119,7 +105,17 @@ def scene_facts(scene: Any) -> dict[str, object]:
 def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) -> Status:
     """Print an answer as text, paths or JSON; a closed output is no error if files are written."""
     if as_json:
-        show(json.dumps(answer.document(command), indent=2, allow_nan=False) + "\n")
+        document = {
+            "command": command,
+            "seqopt": version("seqopt"),
+            **({} if answer.scene is None else {"scene": scene_facts(answer.scene)}),
+            **answer.facts,
+            "written": answer.written,
+            "notes": answer.notes,
+            "failures": answer.failures,
+            "exit_status": answer.status,
+        }
+        show(json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
     elif quiet:
         paths = "".join(f"{path}\n" for path in answer.written)
         show(answer.data or paths or f"{answer.text}\n")

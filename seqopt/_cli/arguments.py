@@ -151,24 +151,23 @@ class Request:
 
 
 def request(words: Sequence[str]) -> Request:
-    """Parse words into a command and its options; a wrong word ends the program."""
-    words = [_renamed(word, words) for word in words]
+    """Parse words into a command and its options; a wrong word ends the program.
+
+    An older word for an option is said, unless words ask for quiet.
+    """
+    words = [*words]
+    for at, word in enumerate(words):
+        flag, sign, value = word.partition("=")
+        if flag in RENAMED:
+            words[at] = f"{RENAMED[flag]}{sign}{value}"
+            if "--quiet" not in words:
+                complain(f"seqopt: {flag} is called {RENAMED[flag]} now")
     helps = any(word.startswith(("-h", "--h")) for word in words)  # argparse takes it shortened
     values = vars(parser(named_command(words), helps=helps).parse_args(words))
     name = values.pop("command")
     if name == "instance":
         values["made_by"] = words
     return Request(name, values, quiet=values.pop("quiet"), json=values.pop("json"))
-
-
-def _renamed(word: str, words: Sequence[str]) -> str:
-    """Return a word as it is called now; an older one is said, unless words ask for quiet."""
-    flag, sign, value = word.partition("=")
-    if flag not in RENAMED:
-        return word
-    if "--quiet" not in words:
-        complain(f"seqopt: {flag} is called {RENAMED[flag]} now")
-    return f"{RENAMED[flag]}{sign}{value}"
 
 
 def named_command(words: Sequence[str]) -> str:

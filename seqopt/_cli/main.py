@@ -20,15 +20,30 @@ WATCHER = Later("seqopt._cli.watcher")  # 60 ms: it needs NumPy
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by its words or those of the shell, and return its `Status`."""
-    said: list[Request] = []
+    words = sys.argv[1:] if arguments is None else arguments
+    asked: Request | None = None  # whose words an error is about
+    status: int = Status.DONE
     try:
-        status = _run(sys.argv[1:] if arguments is None else arguments, said)
+        if "_ARGCOMPLETE" in os.environ:  # the shell asks what may follow
+            import_module("argcomplete").autocomplete(parser())
+        try:
+            asked = request(words) if words else None
+        except SystemExit as stop:  # the parser has said why, or printed its help
+            status = int(stop.code or 0)
+        else:
+            if asked is None:
+                show(EXAMPLES)
+            else:
+                shows = not asked.quiet
+                with quiet_numbers(quiet=asked.quiet), WATCHER.Watcher(shows=shows) as tell:
+                    answer = asked.answer(tell)
+                status = print_answer(answer, asked.name, quiet=asked.quiet, as_json=asked.json)
         flush()
     except BrokenPipeError:  # the reader of our output has gone: not an error of ours
         silence(sys.stdout)
         return Status.DONE
     except (SeqoptError, KeyboardInterrupt, MemoryError, OSError) as error:
-        status = status_of(error, said[0].spoken if said else str)
+        status = status_of(error, str if asked is None else asked.spoken)
         with suppress(OSError):
             flush()
     return status
@@ -54,19 +69,3 @@ def load(words: Sequence[str]) -> None:
         COMMANDS[asked].load()
     gc.freeze()
     gc.enable()
-
-
-def _run(words: Sequence[str], said: list[Request]) -> int:
-    if "_ARGCOMPLETE" in os.environ:  # the shell asks what may follow
-        import_module("argcomplete").autocomplete(parser())
-    if not words:
-        show(EXAMPLES)
-        return Status.DONE
-    try:
-        asked = request(words)
-    except SystemExit as stop:  # the parser has said why, or printed its help
-        return int(stop.code or 0)
-    said.append(asked)  # whose words an error is about
-    with quiet_numbers(quiet=asked.quiet), WATCHER.Watcher(shows=not asked.quiet) as tell:
-        answer = asked.answer(tell)
-    return print_answer(answer, asked.name, quiet=asked.quiet, as_json=asked.json)

@@ -11,16 +11,9 @@ from seqopt._cli.terminal import wrapped
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import REASONS, USUAL, AutoEngine, _chooser_of
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.requirements import (
-    LIFTED,
-    LINEAR_RANGE,
-    _carrying_excesses,
-    _prop_faults,
-    overloads,
-)
+from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts, _settlement_said
 
 
@@ -48,11 +41,6 @@ def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
     """Describe the payloads, and capacities of props, that steps exceed."""
     found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)
-
-
-def carrying_notes(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Describe robots that place or remove bricks heavier than their payload."""
-    return tuple(f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
 
 
 def waits_said(build: ShownBuild) -> Iterator[str]:
@@ -103,24 +91,18 @@ def settlement_notes(scene: Scene) -> tuple[str, ...]:
     return tuple(f"stability: {said}" for said in [_settlement_said(scene)] if said)
 
 
-def kept_range(answer: Answer, beyond: str | None) -> Answer:
-    """Return an answer whose status reports a plan beyond the limit on the linear range."""
-    if not beyond or answer.status is not Status.DONE:
-        return answer
-    said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
-
-
 def marked(
     answer: Answer,
     outside: Sequence[object],
     over: Sequence[str] | None = None,
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
     unreached: Sequence[str] = (),
+    beyond: str | None = None,
 ) -> Answer:
     """Return an answer that says, and begins with it, how plans leave the linear range.
 
-    Its facts have that, `exceeded` payloads, verdicts by build, and steps that arms cannot do.
+    Its facts have that, `exceeded` payloads, verdicts by build, and steps that arms cannot do; its
+    status reports a plan that is ``beyond`` the limit on the range.
     """
     lines = [*(f"{OUTSIDE}: {each}" for each in outside), *[REMEDY] * bool(outside)]
     facts = {**answer.facts, "outside_linear_range": [*map(str, outside)]}
@@ -132,4 +114,8 @@ def marked(
     text, notes = answer.text, (*answer.notes, *(f"arms: {each}" for each in unreached))
     if text:
         text = "\n".join([*map(wrapped, lines), text])
-    return replace(answer, facts=facts, text=text, notes=notes if text else (*lines, *notes))
+    answer = replace(answer, facts=facts, text=text, notes=notes if text else (*lines, *notes))
+    if not beyond or answer.status is not Status.DONE:
+        return answer
+    said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)

@@ -20,17 +20,9 @@ from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.words import (
-    FLAGS,
-    HIDDEN,
-    HOW,
-    MOST_WORKERS,
-    QUESTIONS,
-    SPREAD,
-    VALUES,
-    parse_count,
-)
+from seqopt._cli.words import FLAGS, HIDDEN, HOW, MOST_WORKERS, QUESTIONS, SPREAD, VALUES
 from seqopt._registry import COMMANDS
+from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
 
 OWN = "What is it about?"  # of options under no question
@@ -110,7 +102,10 @@ class Option:
             return number_word(value, self.flag, **how)
         if self.kinds <= {int, type(None)}:
             least, most = self.more.get("least", 1), self.more.get("most", MOST_WORKERS)
-            return parse_count(value, self.flag, most, least)
+            if not (value.isascii() and value.isdecimal() and least <= int(value[:12]) <= most):
+                given = f"{self.flag} {value}"
+                raise ProblemError(f"{given}: give a whole number from {least} to {most}")
+            return int(value)
         return self.more["parse"](value) if "parse" in self.more else value
 
 

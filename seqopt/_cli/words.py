@@ -156,13 +156,6 @@ def demanded(
     return Standing(mortar, radians(tilt or 0.0), cures)
 
 
-def parse_count(text: str, where: str, most: int, least: int = 1) -> int:
-    """Parse an integer within bounds; ``where``: argument, for messages."""
-    if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
-        raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
-    return int(text)
-
-
 SPREAD: dict[str, Callable[..., Any]] = {
     "scene": find_scene,
     "schedule": Part,

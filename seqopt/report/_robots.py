@@ -138,23 +138,19 @@ class Cell:
         return np.array([at, at - far * along])
 
     def arm(self, robot: Robot, node: int | None) -> Floats:
-        """Return the points of a robot's arm that holds a node, or of one that is idle."""
-        key = (robot.name, node)
-        if key not in self._sketched:
-            self._sketched[key] = self._sketch(robot, node)
-        return self._sketched[key]
+        """Return the points of a robot's arm that holds a node, or of one that is idle.
 
-    def _sketch(self, robot: Robot, node: int | None) -> Floats:
-        """Return the points of an arm, elbow up, whose tool comes as that of a task does.
-
-        That of nobody is folded over its base; long arms are drawn short.
+        Its elbow is up, and its tool comes as that of a task does; an idle one is folded over its
+        base; long arms are drawn short.
         """
+        if (known := self._sketched.get((robot.name, node))) is not None:
+            return known
         shoulder, reach = self.shoulders[robot.name]
         foot, link = self._on_ground(shoulder), min(0.5 * reach, _LONGEST * self.size)
         if node is None:
             ahead = self._away(self.middle - shoulder)
             bent = [shoulder + link * (up * self.up + on * ahead) for up, on in _FOLDED]
-            return np.array([foot, shoulder, *bent])
+            return self._sketched.setdefault((robot.name, node), np.array([foot, shoulder, *bent]))
         held, brick = hold(self.scene, robot, node), self.scene.brick_of_node[node]
         tip = np.array(held.grip.point)
         wrist = tip - (held.depth + _TOOL * max(brick.dimensions)) * held.grip.axes[2]
@@ -164,7 +160,8 @@ class Cell:
         rise = np.sqrt(max((_SPARE * max(link, 0.5 * size)) ** 2 - 0.25 * size**2, 0.0))
         across = _unit(self.up - (self.up @ along) * along)
         elbow = shoulder + 0.5 * span + rise * (self._away(along) if across is None else across)
-        return np.array([foot, shoulder, elbow, wrist, tip])
+        line = np.array([foot, shoulder, elbow, wrist, tip])
+        return self._sketched.setdefault((robot.name, node), line)
 
     def _on_ground(self, point: Floats) -> Floats:
         return np.asarray(point - (point @ self.up - self.level) * self.up)

@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike
 
 from seqopt._files import csv_text
 from seqopt.arms._urdf import shape_notes
-from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
@@ -230,17 +229,15 @@ def _fields(
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
         support[i] = found.support[0]
     parts = (twist, edge, support[..., :3], support[..., 3:])
-    return {name: _packed(part) for name, part in zip(FIELDS, parts, strict=True)}
-
-
-def _packed(values: Floats) -> dict[str, object]:
-    """Return fields (steps, …) as compressed whole numbers, and their unit in each step."""
-    flat = values.reshape(len(values), -1)
-    size = np.abs(flat).max(axis=1, initial=0.0)
-    scale = np.where(size > 0, size / LARGEST, 1.0)
-    packed = gzip.compress(np.round(flat / scale[:, None]).astype("<i2").tobytes(), 9, mtime=0)
-    data = b64encode(packed).decode("ascii")
-    return {"scale": [float(f"{s:.6g}") for s in scale], "width": flat.shape[1], "data": data}
+    out = dict[str, object]()
+    for name, part in zip(FIELDS, parts, strict=True):  # whole numbers, of a unit in each step
+        flat = part.reshape(count, -1)
+        size = np.abs(flat).max(axis=1, initial=0.0)
+        scale = np.where(size > 0, size / LARGEST, 1.0)
+        packed = gzip.compress(np.round(flat / scale[:, None]).astype("<i2").tobytes(), 9, mtime=0)
+        units, data = [float(f"{s:.6g}") for s in scale], b64encode(packed).decode("ascii")
+        out[name] = {"scale": units, "width": flat.shape[1], "data": data}
+    return out
 
 
 def report_page(

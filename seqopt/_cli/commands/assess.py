@@ -19,7 +19,7 @@ from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
-from seqopt.problem.requirements import number_word
+from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.sequence.part import find_scene, plan_folder
@@ -87,7 +87,8 @@ def run(
         found = each_stability(network, steps, each, wanted, shared=shared)
         pairs = zip(told, found, strict=True)
         rows += [{"mortar": name, **stability_row(step, result)} for step, result in pairs]
-    scene, carried = network.scene, remarks.carrying_notes(network.scene, steps)
+    scene = network.scene
+    carried = (f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
     notes = (*taken, *remarks.settlement_notes(scene), *carried)
     return replace(_answer(output, mortars, rows), scene=scene, notes=notes)
 

@@ -111,9 +111,8 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
         scene=scene,
     )
     unreached = () if plan.arms is None else plan.arms.faults
-    answer = remarks.marked(answer, plan.departures, over, verdicts, unreached)
-    far = plan.is_far and not _problem(plan).lifts_range
-    return remarks.kept_range(answer, plan.beyond if far else None)
+    beyond = plan.beyond if plan.is_far and not _problem(plan).lifts_range else None
+    return remarks.marked(answer, plan.departures, over, verdicts, unreached, beyond)
 
 
 def _report(

@@ -91,9 +91,9 @@ def run(
         *(figure_notes() if written else ()),
         *([remarks.spent_said(front_spent(front))] if details else []),
     )
-    answer = remarks.marked(_answer(front, free.engine, output, written), builds_in_words(left))
-    answer = replace(answer, notes=(*answer.notes, *notes))
-    return remarks.kept_range(answer, front.beyond)
+    answer = _answer(front, free.engine, output, written)
+    answer = remarks.marked(answer, builds_in_words(left), beyond=front.beyond)
+    return replace(answer, notes=(*answer.notes, *notes))
 
 
 def _answer(front: Front, engine: Engine, output: Output, written: tuple[Path, ...]) -> Answer:

@@ -15,6 +15,7 @@ from seqopt._files import csv_text
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.plan.build import GivenSequence
+from seqopt.problem.requirements import _carrying_excesses
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.sequence.steps import _idle_note
 from seqopt.times._build import times
@@ -76,7 +77,8 @@ def run(asked: Annotated[Call, ("call", times)], *, out: Folder = None, progress
     lines.append(where)
     trouble = posture_trouble(built, words.get("cache"), progress)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(built, build.steps)
-    notes += remarks.carrying_notes(built, build.steps)
+    carried = _carrying_excesses(built, build.steps)
+    notes += tuple(f"payload exceeded: {excess}" for excess in carried)
     notes += (*_idle_note(built, "robots", build.steps), *(f"arms: {each}" for each in cannot))
     notes += figure_notes() if written else ()
     facts: dict[str, Any] = {"makespan_s": makespan, "reassigned_s": least}

@@ -179,7 +179,7 @@ class RegretTable:
                 numbers = [percent(row[name]) for name in ("regret", "gap", "error")]
                 late = f"  {CUT}" if row["status"] == CUT else ""
                 yield (
-                    f"{mark} {_short(row):39}{_digits(row['seconds']):>9}"
+                    f"{mark} {_short(row):39}{seconds_text(row['seconds']).removesuffix(' s'):>9}"
                     f"{''.join(f'{number:>10}' for number in numbers)}{late}"
                 )
             for (status, why), rows in without.groupby(["status", "why"], sort=False):
@@ -216,15 +216,10 @@ def percent(share: float) -> str:
     return f"{number} %" if share else "0"
 
 
-def _digits(seconds: float) -> str:
-    """Return a time with three digits that count."""
-    return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:#.3g}"
-
-
 def seconds_text(seconds: float) -> str:
-    """Return a time in words.
+    """Return a time in words, with three digits that count.
 
     >>> seconds_text(0.1014), seconds_text(26.04), seconds_text(512.2)
     ('0.101 s', '26.0 s', '512 s')
     """
-    return f"{_digits(seconds)} s"
+    return f"{seconds:,.0f} s" if seconds >= 100 else f"{seconds:#.3g} s"
