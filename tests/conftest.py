@@ -63,8 +63,15 @@ def pytest_ignore_collect(collection_path, config):
     return None if wanted else True
 
 
-def pytest_collection_modifyitems(items):
-    """Start with the tests that take longest, so that no worker waits for them at the end."""
+@pytest.hookimpl(tryfirst=True)  # before workers read the groups
+def pytest_collection_modifyitems(config, items):
+    """Start with the tests that take longest, so that no worker waits for them at the end.
+
+    The quick tests of a file stay with one worker, which makes what they share once.
+    """
+    for item in items:
+        if config.option.markexpr == "not slow" and not item.get_closest_marker("xdist_group"):
+            item.add_marker(pytest.mark.xdist_group(item.path.as_posix()))
     items.sort(key=lambda item: (item.name != LONGEST, item.path.parent.name not in LARGE))
 
 

@@ -193,7 +193,7 @@ def test_props_are_said_in_words(capsys, tmp_path):
 
 
 def test_an_older_word_does_as_before_and_says_the_new_one(capsys):
-    scene = "chain:bricks=7"
+    scene = "chain:bricks=6"
     words = ("optimize", scene, "--schedule", "free", "--json", "--no-stability")
     for older in (("--criteria", "weighted"), ("--criteria=weighted",)):
         status, out, err = command(capsys, *words, *older)
@@ -202,22 +202,20 @@ def test_an_older_word_does_as_before_and_says_the_new_one(capsys):
     _, new, err = command(capsys, *words, "--criterion", "weighted")
     assert "is called" not in err
     assert json.loads(new)["summary"]["objective"] == json.loads(out)["summary"]["objective"]
-    quiet = ("pareto", scene, "--aim", "minmax,steps", "--criteria", "weighted", "--quiet")
+    quiet = (*words, "--criteria", "weighted", "--quiet")
     assert "is called" not in command(capsys, *quiet)[2]
 
 
 def test_a_pareto_set_takes_a_criterion_as_others_do(capsys):
-    scene, aim = "chain:bricks=7", "minmax,steps"
+    scene, aim, ends = "chain:bricks=6", "minmax,steps", set()
     for name in ("worst-ratio-published", "weighted"):
-        plan = seqopt.optimize(scene, "free", name, aim="minmax,steps")
+        plan = seqopt.optimize(scene, "free", name, aim=aim)
         front = seqopt.pareto(scene, aim=aim, criterion=name)
         assert front.table["minmax"][0] == pytest.approx(plan.objective["minmax"], rel=1e-9)
         words = ("pareto", scene, "--aim", aim, "--criterion", name, "--json", "--no-stability")
         (row, *_) = json.loads(command(capsys, *words)[1])["points"]
         assert row["minmax"] == pytest.approx(plan.objective["minmax"], rel=1e-9)
-    ends = {
-        seqopt.pareto(scene, aim=aim, criterion=n).table["minmax"][0] for n in (None, "weighted")
-    }
+        ends.add(front.table["minmax"][0])
     assert len(ends) == 2  # else the criterion would count for nothing
 
 
