@@ -254,17 +254,12 @@ def residuals(scene: Scene, wanted: Target) -> Floats:
     return np.asarray(beyond / size)
 
 
-def roughness() -> Floats:
-    """Return the map from pitch to its deviation from the nearest cubic spline of 9 knots."""
-    knots = np.linspace(0, BRICKS - 1, 9)
-    splines = CubicSpline(knots, np.eye(len(knots)))(np.arange(BRICKS))
-    return np.asarray(np.eye(BRICKS) - splines @ np.linalg.pinv(splines))
-
-
 def fit(numbers: Floats, groups: Sequence[Free], wanted: Target, most: int) -> tuple[Floats, float]:
     """Return the fitted numbers and the robust cost that remains."""
     step = np.concatenate([np.full(group.count, group.step) for group in groups])
-    rough = roughness()
+    knots = np.linspace(0, BRICKS - 1, 9)  # of a cubic spline that pitch should be near
+    splines = CubicSpline(knots, np.eye(len(knots)))(np.arange(BRICKS))
+    rough = np.eye(BRICKS) - splines @ np.linalg.pinv(splines)
 
     def cost(scaled: Floats) -> Floats:
         numbers = scaled * step

@@ -318,7 +318,8 @@ def experiment(options: Options) -> Finding:
             print(*rows[-1].values(), flush=True)
             _keep(best, row)
     if options.store:
-        KNOWN.write_text(_lines(best), "utf-8")
+        lines = [f"{json.dumps(n)}: {json.dumps(best[n])}" for n in MADE if n in best]
+        KNOWN.write_text("{" + ",\n".join(lines) + "}\n", "utf-8")
     listed = [_listed(name, best[name]) for name in names if name in best]
     found = {"instance_contest": pd.DataFrame(rows), "instance_library": pd.DataFrame(listed)}
     if not options.quick:
@@ -335,12 +336,6 @@ def _joined(rows: pd.DataFrame, name: str, names: Sequence[str]) -> pd.DataFrame
     return every.sort_values("instance", key=lambda of: of.map(place), kind="stable")
 
 
-def _lines(best: dict[str, dict]) -> str:
-    """Return what is known as JSON, a line for every instance."""
-    rows = [f"{json.dumps(name)}: {json.dumps(best[name])}" for name in MADE if name in best]
-    return "{" + ",\n".join(rows) + "}\n"
-
-
 COLUMNS = ("instance", "solver", "value", "bound", "proven", "end", "seconds")
 
 
@@ -350,7 +345,9 @@ def _keep(best: dict[str, dict], row: dict) -> None:
         return
     before = best.get(row["instance"])
     now = (*row["values"],)
-    claims = _small(row["claims"])
+    claims = row["claims"]
+    if any(len(each.get("labels", {}).get("nodes", ())) > LABELS for each in claims):  # too many
+        claims = [{k: v for k, v in c.items() if k not in ("labels", "value")} for c in claims]
     proof = judge_instance(instance(row["instance"]), {"nodes": row["nodes"]}, claims)
     found = {"values": [*now], "nodes": row["nodes"], "by": row["solver"], "claims": claims}
     found |= {"bounds": [*proof.bounds], "bound_by": row["solver"]}
@@ -358,15 +355,8 @@ def _keep(best: dict[str, dict], row: dict) -> None:
         if before is not None and len(now) == 1 and before["bounds"][0] > found["bounds"][0]:
             found |= {key: before[key] for key in ("bounds", "bound_by", "claims")}
         best[row["instance"]] = found
-    elif _same(now, before["values"]) and _better(before["bounds"], found["bounds"]):
+    elif not _better(before["values"], now) and _better(before["bounds"], found["bounds"]):
         before |= {key: found[key] for key in ("bounds", "bound_by", "claims")}
-
-
-def _small(claims: list[dict]) -> list[dict]:
-    """Return claims without labels that are too many to be kept."""
-    many = any(len(each.get("labels", {}).get("nodes", ())) > LABELS for each in claims)
-    less = ("labels", "value")
-    return [{k: v for k, v in c.items() if k not in less} for c in claims] if many else claims
 
 
 def _better(first: list[float], then: list[float]) -> bool:
@@ -375,10 +365,6 @@ def _better(first: list[float], then: list[float]) -> bool:
         if abs(a - b) > CLOSE * max(abs(a), abs(b)):
             return a < b
     return False
-
-
-def _same(first: list[float], then: list[float]) -> bool:
-    return not _better(first, then) and not _better(then, first)
 
 
 def _listed(name: str, found: dict) -> dict[str, object]:

@@ -40,7 +40,8 @@ def touching(centroid: Floats, weight: Floats, contacts: Sequence[Contact]) -> A
     """Return an assembly without grips from centroids, weights (N) and contacts."""
     faces = [contact.corner for contact in contacts]
     bodies = np.array([contact.bodies for contact in contacts])
-    normals = np.array([_normal(face) for face in faces])
+    fans = [np.cross(face[1:-1] - face[0], face[2:] - face[0]).sum(axis=0) for face in faces]
+    normals = np.array([fan / np.linalg.norm(fan) for fan in fans])
     middle = np.array([face.mean(axis=0) for face in faces])
     ends = bodies.tolist()
     # the ground lies behind its face
@@ -115,12 +116,6 @@ def ring(blocks: int, radius: float, thickness: float, half_angle: float = np.pi
     angle = np.linspace(-half_angle, half_angle, blocks + 1)
     size = [radius - thickness / 2, radius + thickness / 2]
     return voussoirs(np.einsum("s,dn->nsd", size, [np.sin(angle), np.cos(angle)]))
-
-
-def _normal(face: Floats) -> Floats:
-    """Return the unit normal of a flat polygon (m, 3)."""
-    fan = np.cross(face[1:-1] - face[0], face[2:] - face[0]).sum(axis=0)
-    return np.asarray(fan / np.linalg.norm(fan))
 
 
 def _tetrahedra(block: Floats) -> tuple[Floats, Floats]:
