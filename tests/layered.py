@@ -146,10 +146,6 @@ class Answer:
     compile_seconds: float = 0.0
 
 
-def aim_of(formulation):
-    return formulation.aim or Aim.SUM
-
-
 def answer(
     costs,
     formulation="overlap_dp",
@@ -162,7 +158,7 @@ def answer(
 ):
     """The judged answer of a formulation, by name or itself, for costs."""
     formulation = as_formulation(formulation)
-    compiled = costs.compiled(aim or aim_of(formulation))
+    compiled = costs.compiled(aim or formulation.aim or Aim.SUM)
     run = Run(time_limit, progress, proof, options=options)
     found = find_path(compiled.instance, formulation, run)
     claimed = found.selection

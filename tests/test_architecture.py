@@ -239,14 +239,9 @@ def test_a_page_of_exports_opens_its_own_room_only():
         assert not is_page(own) or not foreign, own
 
 
-def is_private(dotted_name: str) -> bool:
-    """Return whether a module, or a folder that it is in, has a leading underscore."""
-    return any(part[0] == "_" and part[-2:] != "__" for part in dotted_name.split("."))
-
-
 def public_names(module: str, tree: ast.Module) -> list[str]:
     """Return the functions and classes of a module that others may build on."""
-    if is_private(module):
+    if any(part[0] == "_" and part[-2:] != "__" for part in module.split(".")):
         return []
     named = [part.name for part in tree.body if isinstance(part, ast.ClassDef | ast.FunctionDef)]
     return [f"{module}.{name}" for name in named if name[0] != "_"]
@@ -324,14 +319,11 @@ def test_the_frame_shares_no_mechanics():
     assert shared == {"seqopt.engines.rigid._mixed.require_resistance"}
 
 
-def described(node: ast.AST) -> bool:
-    return ast.get_docstring(node) is not None  # type: ignore[arg-type]
-
-
 def code_lines(text: str) -> set[int]:
     """Return the lines of a module that are code: no docstring, import, comment or blank one."""
     tree, found = ast.parse(text), set[int]()
-    prose = {node.body[0] for node in ast.walk(tree) if isinstance(node, SAID) and described(node)}
+    every = (node for node in ast.walk(tree) if isinstance(node, SAID))
+    prose = {node.body[0] for node in every if ast.get_docstring(node) is not None}
     for token in generate_tokens(StringIO(text).readline):
         if token.type not in NO_CODE:
             found |= {*range(token.start[0], token.end[0] + 1)}

@@ -47,13 +47,6 @@ def soft():
     return scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
 
 
-def principal(scene):
-    """Stiffnesses of all grips in three directions of their own, the stiffest first, N/m."""
-    held = scene.held_postures
-    own = held.compliance(scene.arms)[held.rows >= 0][:, :3, :3]
-    return 1 / np.linalg.eigvalsh(own)
-
-
 def worst(scene, steps):
     """The largest force of a grip, N, and the largest displacement, 0.001 mm."""
     table = seqopt.analyze(make_engine("compliance", scene), steps)
@@ -62,7 +55,9 @@ def worst(scene, steps):
 
 
 def test_grips_are_as_stiff_as_the_page_says(soft):
-    found = principal(soft)
+    held = soft.held_postures
+    own = held.compliance(soft.arms)[held.rows >= 0][:, :3, :3]
+    found = 1 / np.linalg.eigvalsh(own)  # in directions of their own, the stiffest first, N/m
     assert len(found) == 147
     ends = [found[:, 2].min(), found[:, 2].max(), found[:, 0].min(), found[:, 0].max()]
     assert ends == pytest.approx([0.930e5, 2.231e5, 4.272e5, 23.93e5], rel=1e-3)

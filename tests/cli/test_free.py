@@ -149,7 +149,7 @@ def test_samples_alone_ask_for_the_worst_peak(capsys, arch):
     assert (status, "over 3 scenarios (worst-peak)" in out) == (0, True)
 
 
-@pytest.mark.parametrize("aim", ["worst-peak", "cvar=0.5"])
+@pytest.mark.parametrize("aim", [pytest.param("worst-peak", marks=pytest.mark.slow), "cvar=0.5"])
 def test_a_plan_over_scenarios_is_written(capsys, tmp_path, arch, aim):
     words = ("--robust", aim, "--scenarios", "4", "--seed", "5", "--out", tmp_path)
     more = ("--criterion", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")

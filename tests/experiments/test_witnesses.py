@@ -196,11 +196,11 @@ BOXES += [f"{x},0,{0.2 * k + 0.1:g},0.6,0.3,0.2" for k, x in enumerate((0, 0.15,
     ("scene", "values"),
     [
         ("wall:columns=2,courses=2,corbel=0.08", {"tilt": (8.0,)}),
-        ("boxes", {"friction": (0.2,), "tilt": (0.0, 6.0)}),
         *(
             pytest.param(*case, marks=pytest.mark.slow)
             for case in (
                 ("wall:columns=3,courses=3,corbel=0.08", {"friction": (0.2,), "tilt": (8.0,)}),
+                ("boxes", {"friction": (0.2,), "tilt": (0.0, 6.0)}),
                 ("vault:span=1,rise=0.4,columns=2", {"friction": (0.5,)}),
             )
         ),

@@ -232,11 +232,6 @@ def arch(engine25):
     return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
 
 
-def pose_goals(text):
-    engine = seqopt.make_engine("compliance", small_arch(4))
-    return build_states(engine, FreeRules(), ONES, text).goals
-
-
 @pytest.mark.slow
 def test_all_states_of_the_arch_are_counted(arch):
     assert explore(arch).graph().graph.states == 71035  # start and end among them
@@ -254,7 +249,8 @@ def test_where_memory_ends_there_is_a_bound(arch):
         ({"seconds": 0}, TimeUpError, "no plan was found yet"),
     ):
         for aim in ("minmax", "tilt,minmax"):
-            problem = replace(arch, goals=pose_goals(aim))
+            small = seqopt.make_engine("compliance", small_arch(4))
+            problem = replace(arch, goals=build_states(small, FreeRules(), ONES, aim).goals)
             with pytest.raises(error, match=said):
                 seqopt.solve(problem, "schedule_search", **words)
 

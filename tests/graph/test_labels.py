@@ -171,16 +171,11 @@ def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25
     assert level == states.space.levels
 
 
-def conditional(problem):
-    """The same candidates, ranks being those given the choice before."""
-    criterion = replace(problem.criterion, ranked=Ranked.CONDITIONAL)
-    return replace(problem, criterion=criterion)
-
-
 @pytest.mark.slow
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
-    cascade, other = solve(problem25, "cascade"), conditional(problem25)
+    criterion = replace(problem25.criterion, ranked=Ranked.CONDITIONAL)  # on the choice before
+    cascade, other = solve(problem25, "cascade"), replace(problem25, criterion=criterion)
     own, sums = of_layers(problem25).sums, of_layers(other).sums
     assert own.cost(cascade.choice) == pytest.approx(663.81, abs=0.01)
     assert sums.cost(cascade.choice) == pytest.approx(664.5)

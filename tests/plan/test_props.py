@@ -133,12 +133,7 @@ def test_props_make_plans_stand_dry():
 
 
 # what becomes of a plan where something has changed
-def held_arch(count=6, robots=3):
-    more = (seqopt.Robot(name=f"rob{k}", payload=150.0) for k in range(1, robots + 1))
-    return small_arch(count).with_robots(*more)
-
-
-SCENE = held_arch()
+SCENE = small_arch(6).with_robots(*(seqopt.Robot(name=f"rob{k}", payload=150.0) for k in (1, 2, 3)))
 ENGINE = seqopt.make_engine("compliance", SCENE)
 PLAN = seqopt.solve(seqopt.pose(ENGINE, FreeRules(), ONES, "minmax,steps"))
 

@@ -97,19 +97,15 @@ def _faults(case: Case, folder: Path, status: int, said: tuple[str, str]) -> Ite
         yield f"more than lines of its own on standard error: {said[1][:300]!r}"
     if "\x1b" in said[0] + said[1]:
         yield "a sign that steers a terminal"
-    if (folder / "scene.json").read_bytes() != case.scene and not _is_output(case.words):
+    before = [first for first, second in pairwise(case.words) if second == "scene.json"]
+    outputs = before and all(word in ("--out", "--export", "--fields") for word in before)
+    if (folder / "scene.json").read_bytes() != case.scene and not outputs:
         yield "the input was changed"
     yield from _faults_of_files(case, folder, status)
     if status < Status.BAD_INPUT and (fault := _fault_of_table(said[0])):
         yield fault
     if status < Status.BAD_INPUT and case.words[0] == "compare" and " inf" in said[0]:
         yield "compare prints inf"
-
-
-def _is_output(words: tuple[str, ...]) -> bool:
-    """Return whether the scene's file is named as an output alone."""
-    before = [first for first, second in pairwise(words) if second == "scene.json"]
-    return bool(before) and all(word in ("--out", "--export", "--fields") for word in before)
 
 
 def _faults_of_files(case: Case, folder: Path, status: int) -> Iterator[str]:

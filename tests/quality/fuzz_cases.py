@@ -28,13 +28,6 @@ def pick(rng: np.random.Generator, things: Sequence[Any]) -> Any:
     return things[int(rng.integers(len(things)))]
 
 
-def right_words(rng: np.random.Generator, *, plan: bool) -> tuple[str, ...]:
-    """Return a command that is right."""
-    steps = ["analyze", "assess"]
-    command = str(rng.choice(steps if plan else COMMANDS, p=(0.85, 0.15) if plan else SHARES))
-    return (command, "scene.json", *MORE[command](rng, plan))
-
-
 def _engine(rng: np.random.Generator) -> list[str]:
     """Return an engine for a few grip sets."""
     engine = pick(rng, (*QUICK, "discrete"))
@@ -163,7 +156,11 @@ class Mutator:
         rng = np.random.default_rng(number)
         document, plan = self._base[rng.integers(len(self._base))]
         kind = str(rng.choice(["scene", "scene", "scene", "plan", "words", "nothing"]))
-        words = right_words(rng, plan=kind == "plan")
+        known, shares = COMMANDS, SHARES
+        if kind == "plan":
+            known, shares = ["analyze", "assess"], (0.85, 0.15)
+        command = str(rng.choice(known, p=shares))
+        words = (command, "scene.json", *MORE[command](rng, kind == "plan"))
         scene = json.dumps(document)
         if kind == "scene":
             scene = _changed_scene(rng, document)

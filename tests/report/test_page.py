@@ -256,12 +256,6 @@ def test_without_anywidget_one_line_says_what_to_install(monkeypatch):
         Page("").widget()
 
 
-def tables_of(text):
-    """Return the rows of the tables of a page, a list of cells each."""
-    rows = re.findall(r"<tr.*?</tr>", text.split('id="data"')[0], re.S)
-    return [re.findall(r"<t[hd][^>]*>(.*?)</t", row) for row in rows]
-
-
 @pytest.mark.slow
 def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(engine25, builds):
     table = builds["sequential"].table.copy()
@@ -273,7 +267,8 @@ def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(eng
     assert sentence.startswith("Not buildable: payload exceeded in 3 of 49 steps, first in step 4 ")
     assert "(robot 1 would hold up to 1,565 N and can hold 392.4 N)" in sentence
     assert "a robot would hold more than it can. Such steps are marked in red<" in text
-    rows = tables_of(text)
+    rows = re.findall(r"<tr.*?</tr>", text.split('id="data"')[0], re.S)
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t", row) for row in rows]
     at = rows[0].index(OVER)
     assert {row[0]: row[at] for row in rows[1:]}["cascade"] == "3 steps"
     assert data_of(text)["builds"][0]["decides"] == 3

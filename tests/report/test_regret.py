@@ -25,14 +25,11 @@ ONCE = {"seconds": 600.0, "timer": Timer(within=lambda _: nullcontext(), times=1
 COLUMNS = ["engine", "schedule", "formulation", "without", "exact", "seconds", "regret"]
 
 
-def table_of(*rows):
-    table = pd.DataFrame(rows, columns=COLUMNS)
-    return table.assign(status=DONE, why="", gap=0.0, error=0.0, value=1.0, own=1.0, models=1)
-
-
 def made(*rows):
     about = "arch", 7, "compliance", "compliance", "worst-ratio", 9.0
-    return RegretTable(*about, table_of(*rows))
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    known = {"status": DONE, "why": "", "gap": 0.0, "error": 0.0, "value": 1.0, "own": 1.0}
+    return RegretTable(*about, table.assign(**known, models=1))
 
 
 FOUR = (

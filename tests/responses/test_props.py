@@ -276,13 +276,8 @@ def by_references(network, steps):
         yield twist.reshape(-1, 6), force, acting, -stress
 
 
-def by_method(method, scene):
-    network = build_network(scene)
-    return network, method(network)
-
-
 BUILDS = {
-    "cantilever": lambda: by_method(cantilever, small_arch(8)),
+    "cantilever": lambda: (net := build_network(small_arch(8)), cantilever(net)),
     "from both sides": lambda: released_in_between(from_both_sides(6, "VL")),
 }
 

@@ -47,10 +47,6 @@ def test_methods_say_what_they_lack(arch25):
         sequential(build_network(replace(arch25, robots=short)))
 
 
-def edited(plan, number, **changes):
-    return [replace(s, **changes) if s.number == number else s for s in plan]
-
-
 @pytest.mark.parametrize(
     ("number", "changes", "named"),
     [
@@ -67,8 +63,9 @@ def edited(plan, number, **changes):
     ],
 )
 def test_impossible_steps(arch25, number, changes, named):
+    plan = published_plan(arch25)
     with pytest.raises(StepError, match=named) as caught:
-        check_sequence(arch25, edited(published_plan(arch25), number, **changes))
+        check_sequence(arch25, [replace(s, **changes) if s.number == number else s for s in plan])
     assert "\n" not in str(caught.value)
 
 

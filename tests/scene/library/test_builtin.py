@@ -95,15 +95,11 @@ def test_the_vault_starts_with_the_arch(vault, arch25):
 def test_bricks_of_the_vault_are_a_joint_apart_and_all_neighbors_are_joined(vault):
     pairs, distance, _ = own_pairs(vault, vault.bricks)
     assert distance.min() > NARROWEST
-    near = {p for p, d in zip_pairs(vault) if d < 2 * WIDEST}
+    every, apart = _separations(vault.bricks)
+    names = np.array([brick.name for brick in vault.bricks])
+    near = {*map(frozenset, names[every][apart < 2 * WIDEST].tolist())}
     assert near == {frozenset(joint.bricks) for joint in vault.joints}
     assert near - pairs == {frozenset(joint.bricks) for joint in vault.joints[:24]}
-
-
-def zip_pairs(scene):
-    pairs, distance = _separations(scene.bricks)
-    names = np.array([brick.name for brick in scene.bricks])
-    return [(frozenset(p), d) for p, d in zip(names[pairs].tolist(), distance, strict=True)]
 
 
 def test_stiffness_of_the_vault_is_that_of_the_arch_by_contact_area(vault, network, arch25):
