@@ -11,14 +11,6 @@ import seqopt
 from tests.builders import ROOT
 
 
-def type_checked():
-    """Return, by name, the modules of what type checkers are told that the door has."""
-    text = Path(seqopt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    imports = [part for part in ast.parse(text).body if isinstance(part, ast.ImportFrom)]
-    assert all(alias.asname == alias.name for part in imports for alias in part.names)
-    return {alias.name: part.module for part in imports for alias in part.names}
-
-
 def test_the_door_shows_its_names_and_no_others():
     assert dir(seqopt) == sorted(seqopt.__all__)
     assert 25 <= len(seqopt.__all__) <= 52
@@ -29,7 +21,10 @@ def test_the_door_shows_its_names_and_no_others():
 
 def test_both_tables_name_the_same_homes():
     lazy = {name: f"seqopt.{home}" for name, home in seqopt._HOME_OF.items()}
-    assert type_checked() == lazy
+    text = Path(seqopt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    imports = [part for part in ast.parse(text).body if isinstance(part, ast.ImportFrom)]
+    assert all(alias.asname == alias.name for part in imports for alias in part.names)
+    assert {alias.name: part.module for part in imports for alias in part.names} == lazy
     assert {*lazy, "__version__"} == {*seqopt.__all__}
 
 

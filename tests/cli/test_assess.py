@@ -93,15 +93,6 @@ def ended(words, when, how=KeyboardInterrupt):
     return answer
 
 
-def in_the_midst(monkeypatch, module, name, how):
-    """Let a function of a module end as if time were over in it."""
-
-    def ends(*_, **__):
-        raise how
-
-    monkeypatch.setattr(module, name, ends)
-
-
 @pytest.mark.parametrize(
     ("words", "module", "judge", "how", "status"),
     [
@@ -115,7 +106,11 @@ def test_a_proof_that_is_ended_leaves_what_is_claimed(
 ):
     whole, out = tmp_path / "whole", tmp_path / "out"
     assert main([*words, "--out", str(whole)]) == 0
-    in_the_midst(monkeypatch, module, judge, how)
+
+    def ends(*_, **__):  # as if time were over in it
+        raise how
+
+    monkeypatch.setattr(module, judge, ends)
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
     assert main([*words, "--out", str(out)]) == status
     known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))

@@ -180,14 +180,7 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
     """Also where who runs the tests ignores signals, as ``nohup`` does."""
     words = ["optimize", "--formulation", "overlap_dp", "--engine", "frame"]  # takes minutes
     words += ["--out", str(tmp_path / "out")]
-    program = subprocess.Popen(
-        [sys.executable, "-m", "seqopt", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-        preexec_fn=partial(signal.signal, which, signal.SIG_DFL),  # noqa: PLW1509  # no threads
-    )
+    program = start(*words, preexec_fn=partial(signal.signal, which, signal.SIG_DFL))
     time.sleep(after)
     program.send_signal(which)
     out, err = program.communicate(timeout=30)

@@ -1,6 +1,5 @@
 """Help; what a person sees."""
 
-import argparse
 import io
 import os
 import re
@@ -32,14 +31,6 @@ def printed(capsys, monkeypatch):
     return run
 
 
-def command_of(name):
-    """The parser of one command."""
-    commands = next(
-        a for a in parser(name)._actions if isinstance(a, argparse._SubParsersAction)
-    ).choices
-    return commands[name]
-
-
 def defined(text):
     """The words that begin a line of a list of options, and whatever stands in its place."""
     begins = (line[2:] for line in text.splitlines() if line[:2] == "  " and line[2:3] > " ")
@@ -56,7 +47,7 @@ def flags(command):
 def test_help_has_every_option_once_and_examples_on_lines_of_their_own(printed, name):
     out = printed(name, "--help")
     assert max(map(len, out.splitlines())) <= 80
-    command = command_of(name)
+    command = parser(name)._subparsers._group_actions[0].choices[name]
     about = "\n".join(group.description or "" for group in command._action_groups)
     said = {line.strip() for line in about.splitlines()}
     kept = [line for line in out.splitlines() if line.strip() not in said]

@@ -239,16 +239,6 @@ def test_nothing_is_corrected_where_joints_are_even(monkeypatch):
             assert np.isfinite(engine.solve(bricks, [[node]]).grip_force).all()
 
 
-def evenly(scene, joint, kind, share):
-    """The scene with equal joints, one of which is softer in one direction."""
-    stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
-    grounds = tuple(replace(g, **stiff) for g in scene.grounds)
-    joints = [replace(j, **stiff) for j in scene.joints]
-    size = stiff[kind][0]
-    joints[joint] = replace(joints[joint], **{kind: (size, share * size, size)})
-    return replace(scene, grounds=grounds, joints=tuple(joints))
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     ("share", "uneven"), [(1.0, False), (_EVEN, False), (0.99 * _EVEN, True), (1.01 / _EVEN, True)]
@@ -260,8 +250,13 @@ def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
     monkeypatch.setattr(
         trial, "_cancels", lambda *seen: looked.append(seen[0].bricks) or _cancels(*seen)
     )
-    joint = scene.joints[2]
-    engine = ComplianceEngine(build_network(evenly(scene, 2, kind, share)))
+    stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
+    grounds = tuple(replace(g, **stiff) for g in scene.grounds)
+    joints = [replace(j, **stiff) for j in scene.joints]
+    size, joint = stiff[kind][0], scene.joints[2]
+    joints[2] = replace(joints[2], **{kind: (size, share * size, size)})  # softer in one direction
+    even = replace(scene, grounds=grounds, joints=tuple(joints))
+    engine = ComplianceEngine(build_network(even))
     for bricks in range(1, len(scene.bricks) + 1):
         engine.solve(bricks, [[scene.placed[bricks - 1].placing_node]])
     acts = 1 + max(scene.build_order.index(brick) for brick in joint.bricks)

@@ -17,15 +17,14 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
 from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
-from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.stability.assessment import Verdict, verdict
+from tests.brute_force import ONES, distance
 from tests.builders import small_arch
 
 SEARCH = "schedule_search"
-ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 1,place,1,?,,,
 2,place,2,?,?,,
@@ -80,9 +79,7 @@ def travel(scene, steps):
     total = 0.0
     for robot in range(len(scene.robots)):
         held = [s.grips[robot] for s in steps if s.grips[robot] is not None]
-        for a, b in pairwise(held):
-            gone = np.subtract(scene.node_position(a), scene.node_position(b))
-            total += float(np.linalg.norm(gone))
+        total += sum(distance(scene, *pair) for pair in pairwise(held))
     return total
 
 

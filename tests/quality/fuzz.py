@@ -170,14 +170,6 @@ def run(first: int, last: int) -> Iterator[tuple[Case, int, str]]:
         yield (case := mutator.case(number), *judge(case))
 
 
-def _damaged(count: int) -> list[str]:
-    """Return what is wrong with how damaged files of every kind are read."""
-    every = [(kind, n) for kind in (right_files() if count else ()) for n in range(count)]
-    with tempfile.TemporaryDirectory() as folder:
-        found = (read_damaged(kind, number, Path(folder)) for kind, number in every)
-        return [each for each in found if each]
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=CASES, help="how many cases")
@@ -190,7 +182,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         wrong += [f"case {number}: {fault}"] if fault else []
     for (kind, status), count in sorted(counts.items()):
         print(f"{kind:8} status {status}: {count}")
-    wrong += _damaged(options.files)
+    kinds = right_files() if options.files else ()
+    with tempfile.TemporaryDirectory() as folder:
+        every = ((kind, number) for kind in kinds for number in range(options.files))
+        found = (read_damaged(*each, Path(folder)) for each in every)
+        wrong += [each for each in found if each]
     print("".join(f"fault: {each}\n" for each in wrong), end="")
     print(f"{'a' if wrong else 'no'} fault: {options.cases} cases")
     return int(bool(wrong))

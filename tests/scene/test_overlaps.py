@@ -129,17 +129,6 @@ def half_spaces(brick):
     return normals, normals @ np.array(brick.position) + half
 
 
-def shared_radius(first, second):
-    """Return the radius of the largest ball in both of two boxes; negative if they are apart."""
-    normals, offsets = (
-        np.concatenate(parts) for parts in zip(half_spaces(first), half_spaces(second), strict=True)
-    )
-    program = np.column_stack([normals, np.ones(len(normals))])
-    found = linprog([0, 0, 0, -1], program, offsets, bounds=[(None, None)] * 3 + [(-MOST, MOST)])
-    assert found.status == 0
-    return found.x[3]
-
-
 @st.composite
 def bricks(draw, name):
     frame = draw(turns)
@@ -160,7 +149,12 @@ def bricks(draw, name):
 @given(first=bricks(1), second=bricks(2))
 def test_planes_and_a_program_agree_on_what_is_apart(first, second):
     pairs, distance = _separations([first, second])
-    radius = shared_radius(first, second)
+    pairs_of_parts = zip(half_spaces(first), half_spaces(second), strict=True)
+    normals, offsets = (np.concatenate(parts) for parts in pairs_of_parts)
+    program = np.column_stack([normals, np.ones(len(normals))])
+    found = linprog([0, 0, 0, -1], program, offsets, bounds=[(None, None)] * 3 + [(-MOST, MOST)])
+    assert found.status == 0
+    radius = found.x[3]  # of the largest ball in both; negative if they are apart
     if len(pairs) == 0:
         assert radius < 0
     elif abs(radius) > 1e-7:
