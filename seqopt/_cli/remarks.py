@@ -82,13 +82,10 @@ def spent_said(
 
 def refused(prover: BuildProver) -> tuple[str, ...]:
     """Return notes on missing verdicts, and on effects that they neglect."""
-    said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
-    return (*said, *settlement_notes(prover.network.scene)) if prover.mortars else said
-
-
-def settlement_notes(scene: Scene) -> tuple[str, ...]:
-    """Return a note that verdicts neglect movements of the ground, if there are any."""
-    return tuple(f"stability: {said}" for said in [_settlement_said(scene)] if said)
+    said = [f"not proven; {prover.refusal}"] if prover.refusal else []
+    if prover.mortars and (moves := _settlement_said(prover.network.scene)):
+        said.append(moves)
+    return tuple(f"stability: {each}" for each in said)
 
 
 def marked(

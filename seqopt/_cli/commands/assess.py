@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any
 
-from seqopt._cli import outputs, remarks
+from seqopt._cli import outputs
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.inputs import read_steps
 from seqopt._cli.outputs import Output
@@ -26,7 +26,7 @@ from seqopt.sequence.part import find_scene, plan_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
-from seqopt.stability.failure_map import AXES, failure_map
+from seqopt.stability.failure_map import AXES, _settlement_said, failure_map
 from seqopt.work.progress import Tell, with_progress
 
 MAP = Later("seqopt.report._failures")  # 24 ms, of pages
@@ -89,7 +89,8 @@ def run(
         rows += [{"mortar": name, **stability_row(step, result)} for step, result in pairs]
     scene = network.scene
     carried = (f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
-    notes = (*taken, *remarks.settlement_notes(scene), *carried)
+    moves = (f"stability: {said}" for said in [_settlement_said(scene)] if said)
+    notes = (*taken, *moves, *carried)
     return replace(_answer(output, mortars, rows), scene=scene, notes=notes)
 
 
