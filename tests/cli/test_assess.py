@@ -5,6 +5,7 @@ import math
 import signal
 from dataclasses import replace
 from functools import partial
+from unittest.mock import Mock
 
 import pandas as pd
 import pytest
@@ -94,35 +95,27 @@ def ended(words, when, how=KeyboardInterrupt):
 
 
 @pytest.mark.parametrize(
-    ("words", "module", "judge", "how", "status"),
-    [
-        (FREE, _answers, "judge_schedule", TimeoutError, 0),
-        (LOOP, _answers, "judge_schedule", TimeoutError, 0),
-        (LOOP, _answers, "judge_schedule", KeyboardInterrupt, 130),
-    ],
+    ("words", "hows"),
+    [(FREE, {TimeoutError: 0}), (LOOP, {TimeoutError: 0, KeyboardInterrupt: 130})],
 )
-def test_a_proof_that_is_ended_leaves_what_is_claimed(
-    tmp_path, monkeypatch, words, module, judge, how, status
-):
-    whole, out = tmp_path / "whole", tmp_path / "out"
+def test_a_proof_that_is_ended_leaves_what_is_claimed(tmp_path, monkeypatch, words, hows):
+    whole = tmp_path / "whole"
     assert main([*words, "--out", str(whole)]) == 0
-
-    def ends(*_, **__):  # as if time were over in it
-        raise how
-
-    monkeypatch.setattr(module, judge, ends)
     monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
-    assert main([*words, "--out", str(out)]) == status
-    known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
-    assert found["objective"] == pytest.approx(known["objective"])
-    assert found["bound"] == pytest.approx(known["bound"])
-    assert (found["gap"], known["gap"]) == (None, 0)
-    assert found["ended"] == ("interrupted" if status else "stopped")
-    scene = seqopt.load_scene(out / "scene.json")
-    assert read_plan(scene, out / "plan.csv") == read_plan(scene, whole / "plan.csv")
-    if not status:  # verdicts, tables and page are made although the time is over
-        assert {path.name for path in whole.iterdir()} == {path.name for path in out.iterdir()}
-        assert {*found["stability"]} == {"dry", "epoxy"}
+    for how, status in hows.items():
+        out = tmp_path / str(status)
+        monkeypatch.setattr(_answers, "judge_schedule", Mock(side_effect=how))
+        assert main([*words, "--out", str(out)]) == status
+        known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
+        assert found["objective"] == pytest.approx(known["objective"])
+        assert found["bound"] == pytest.approx(known["bound"])
+        assert (found["gap"], known["gap"]) == (None, 0)
+        assert found["ended"] == ("interrupted" if status else "stopped")
+        scene = seqopt.load_scene(out / "scene.json")
+        assert read_plan(scene, out / "plan.csv") == read_plan(scene, whole / "plan.csv")
+        if not status:  # verdicts, tables and page are made although the time is over
+            assert {path.name for path in whole.iterdir()} == {path.name for path in out.iterdir()}
+            assert {*found["stability"]} == {"dry", "epoxy"}
 
 
 @pytest.mark.parametrize("words", [LOOP, ("pareto", WALL), ("instance", WALL)])
