@@ -82,10 +82,10 @@ def voussoirs(count, thickness, at, friction):
 
 
 @pytest.mark.parametrize("friction", [0.5, 2.0])
-@pytest.mark.parametrize(("count", "thickness", "at"), [(11, 0.3, 3), (9, 0.3, 4)])
-def test_an_arch_under_a_force(count, thickness, at, friction):
+@pytest.mark.parametrize(("count", "at"), [(11, 3), (9, 4)])
+def test_an_arch_under_a_force(count, at, friction):
     """Pippard, Tranter and Chitty (1936) loaded arches of voussoirs like these until they fell."""
-    assembly, expected = voussoirs(count, thickness, at, friction)
+    assembly, expected = voussoirs(count, 0.3, at, friction)
     found = load_factor(assembly, Mortar(friction=friction))
     assert found.unloaded is Verdict.STANDS
     assert found.factor == pytest.approx(expected, rel=1e-6)
@@ -148,10 +148,9 @@ def plane_collapse(scene, friction):
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.8])
-@pytest.mark.parametrize(("columns", "courses"), [(2, 3)])
 @pytest.mark.parametrize("force", [(10.0, 0.0, 0.0), (-10.0, 0.0, 6.0)])
-def test_a_wall_that_is_pushed_along(columns, courses, force, friction):
-    scene = pushed_wall(columns, courses, force)
+def test_a_wall_that_is_pushed_along(force, friction):
+    scene = pushed_wall(2, 3, force)
     (found,) = load_factors(scene, last_step(scene), Mortar(friction=friction))
     assert found.factor == pytest.approx(plane_collapse(scene, friction), rel=1e-6)
 

@@ -38,18 +38,15 @@ def test_a_base_that_is_only_shown_hits_the_wall_as_its_twin_does(tmp_path, show
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mesh", [True])
-def test_what_is_shown_collides_as_the_same_shapes_do(tmp_path, mesh):
-    more = {}
-    if mesh:
-        corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-        lines = [f"v {0.03 * x} {0.03 * y} {0.4 * z}" for x, y, z in corners]
-        faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
-        (tmp_path / "l3.obj").write_text("\n".join([*lines, *(f"f {f}" for f in faces)]))
-        more["l3"] = '<mesh filename="l3.obj"/>'
+def test_what_is_shown_collides_as_the_same_shapes_do(tmp_path):
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    lines = [f"v {0.03 * x} {0.03 * y} {0.4 * z}" for x, y, z in corners]
+    faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+    (tmp_path / "l3.obj").write_text("\n".join([*lines, *(f"f {f}" for f in faces)]))
+    mesh = {"l3": '<mesh filename="l3.obj"/>'}
     twin = find_postures(beside_a_wall(boxes(tmp_path / "twin.urdf")))
     with pytest.warns(SceneWarning, match="visual"):
-        table = find_postures(beside_a_wall(boxes(tmp_path / "shown.urdf", "visual", **more)))
+        table = find_postures(beside_a_wall(boxes(tmp_path / "shown.urdf", "visual", **mesh)))
     assert table.hits.any()  # so that what is shown is there
     np.testing.assert_allclose(table.joints, twin.joints, atol=1e-9)
     assert (table.hits == twin.hits).all()

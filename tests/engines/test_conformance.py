@@ -252,17 +252,6 @@ def apart(fields, others):
     return worst
 
 
-@pytest.fixture
-def together(monkeypatch):
-    """Forbid what looks at grip sets one by one."""
-
-    def one_by_one(*_):
-        raise AssertionError("a grip set was looked at on its own")
-
-    monkeypatch.setattr(refinement, "solve_mixed", one_by_one)
-    monkeypatch.setattr(refinement, "require_resistance", one_by_one)
-
-
 # a loose joint, an island
 def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monkeypatch):
     monkeypatch.setattr(refinement, "Refinement", None)  # nothing is corrected
@@ -331,10 +320,10 @@ def test_a_scene_that_is_loose_from_its_first_brick():
 
 
 # grip sets that the operator alone does not answer well enough
-@pytest.mark.parametrize("count", [75])
-def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
-    net = build_network(chain(count))
-    tip = 2 * count - 1
+def test_close_grips_on_a_long_chain_are_corrected_together(monkeypatch):
+    for alone in ("solve_mixed", "require_resistance"):  # no set is looked at on its own
+        monkeypatch.setattr(refinement, alone, None)
+    net, count, tip = build_network(chain(75)), 75, 149
     sets = [(tip, tip - 1, tip - 2), (tip, tip - 2, tip - 4), (tip - 1, tip - 2, tip - 3)]
     engine = ComplianceEngine(net)
     columns = grip_columns(net, count, sets)

@@ -52,10 +52,9 @@ def of_fields(engine, bricks, sets, want):
 @needs_numba
 @once
 @pytest.mark.parametrize("want", SOME)
-@pytest.mark.parametrize("grips", [5])
-def test_they_are_those_of_the_fields(grips, want):
+def test_they_are_those_of_the_fields(want):
     engine = ComplianceEngine(build_network(from_both_sides(6)))
-    sets = sets_of(engine.network, 6, grips)
+    sets = sets_of(engine.network, 6, 5)
     found = engine._extremes(6, sets, want, compiled=True)
     assert gap_of(found, of_fields(engine, 6, sets, want)) <= CLOSE
 

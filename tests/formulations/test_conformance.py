@@ -190,14 +190,13 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
         assert worth == pytest.approx(best, abs=1e-6)
 
 
-@pytest.fixture(scope="module")
-def compiled():
-    """Instances of problems, once for all formulations with an aim."""
-    return cache(lambda problem, aim: seqopt.compile_instance(problem, aim=aim))
+@cache
+def compiled(problem, aim):
+    return seqopt.compile_instance(problem, aim=aim)
 
 
 @timely
-def test_no_time_is_enough_for_an_allowed_choice(name, problem25, compiled):
+def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     """Of costs that are known; where states are still to be visited there is no plan yet."""
     plan = seqopt.solve(compiled(problem25, ALL[name].aim), ALL[name], time_limit=0)
     assert plan.ended is End.STOPPED

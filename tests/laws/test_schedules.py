@@ -431,10 +431,9 @@ def test_a_law_that_is_broken_is_seen():
     assert replace(DRY, friction=0.1) != DRY
 
 
-@pytest.mark.parametrize("tilt", [0.1])
-def test_less_tilt_never_hurts(arch25, tilt):
+def test_less_tilt_never_hurts(arch25):
     network, sets = build_network(arch25), np.array([[a, 24] for a in range(2, 24, 3)])
     sets = np.vstack([sets, sets - [0, 1]])
-    upright, tilted = (Screen(network, DRY, x).stands(12, sets) for x in (0.0, tilt))
+    upright, tilted = (Screen(network, DRY, x).stands(12, sets) for x in (0.0, 0.1))
     assert (tilted == STANDS).any()
     never_hurts(tilted, upright)

@@ -44,9 +44,8 @@ def test_changed_input_leaves_no_fault():
     assert {status for _, status, _ in rows} >= {0, 2, 3}
 
 
-@pytest.mark.parametrize("number", [17131])  # bricks of 1e9 m: no answer was finite
-def test_cases_that_were_faults_are_none_now(mutator, number):
-    assert judge(mutator.case(number))[1] == ""
+def test_a_case_that_was_a_fault_is_none_now(mutator):
+    assert judge(mutator.case(17131))[1] == ""  # bricks of 1e9 m: no answer was finite
 
 
 def case_of(mutator, *words):

@@ -137,21 +137,18 @@ def test_the_step_that_decides_is_never_one_that_nobody_holds(engine25, table):
     assert _deciding_step(scene, over, [dry(9)]) == 3
 
 
-@pytest.fixture
-def page(engine25, steps, table, tmp_path):
+@pytest.mark.slow
+@browser
+def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(
+    engine25, steps, table, tmp_path
+):
     known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
     pressed = table.assign(F_max_N=table["F_max_N"].where(table["step"] < 49, -50.0))
     build = Build("sequential", steps, pressed, known)  # in its last step all edges are pressed
-    path = tmp_path / "report.html"
-    path.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
+    page = tmp_path / "report.html"
+    page.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
     if not browses():
         pytest.skip("Chromium does not run here")
-    return path
-
-
-@pytest.mark.slow
-@browser
-def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp_path):
     text, _ = browsed(tmp_path, f"file://{page}")
     assert "sequential, step 26 of 49" in text
     assert 'src="data:image/png' in text  # what is printed

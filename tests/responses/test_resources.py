@@ -87,17 +87,12 @@ def blocks_of(schedule, most):
     ]
 
 
-@pytest.fixture
-def small_blocks(monkeypatch):
-    """Many blocks on a small scene."""
-    monkeypatch.setattr(division, "BLOCK", 50)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "workers"), [pytest.param("compliance", 2, marks=pytest.mark.long), ("auto", 3)]
 )
-def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, workers):
+def test_results_are_the_same_whatever_the_workers(monkeypatch, loop25, name, workers):
+    monkeypatch.setattr(division, "BLOCK", 50)  # many blocks on a small scene
     alone = make_engine(name, loop25.scene)
     shared = make_engine(name, loop25.scene)
     (one, expected), (other, found) = (

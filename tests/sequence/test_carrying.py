@@ -94,9 +94,8 @@ def test_an_advice_is_no_less_than_the_heaviest_brick_and_no_more_than_is_needed
 
 
 @pytest.mark.parametrize("rules", [ANYHOW, DOWN])
-@pytest.mark.parametrize("payloads", [(300.0, 20.0, 150.0)])
-def test_a_heavy_brick_is_for_a_strong_robot(rules, payloads):
-    scene = wall(*payloads)
+def test_a_heavy_brick_is_for_a_strong_robot(rules):
+    scene = wall(300.0, 20.0, 150.0)
     plan = seqopt.solve(replace(posed(scene, rules, "minmax,steps"), criterion=ONES))
     found = carriers(scene, plan.steps)
     assert found.keys() == {1, 2, 3, 4}
