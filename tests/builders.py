@@ -160,26 +160,27 @@ def anywhere(count):
     return tuple(Robot(name=f"rob{i + 1}", payload=400.0) for i in range(count))
 
 
+def with_part(scene, kind, index, **change):
+    """The scene with one brick, joint or ground end changed."""
+    parts = list(getattr(scene, kind))
+    parts[index] = replace(parts[index], **change)
+    return replace(scene, **{kind: tuple(parts)})
+
+
 def hinged(scene, joint):
     """The scene with one joint without rotational stiffness."""
-    joints = list(scene.joints)
-    joints[joint] = replace(joints[joint], rotational_stiffness=(0.0, 0.0, 0.0))
-    return replace(scene, joints=tuple(joints))
+    return with_part(scene, "joints", joint, rotational_stiffness=(0.0, 0.0, 0.0))
 
 
 def torsion_free(scene, joint):
     """The scene with one joint that does not resist turning about its first axis."""
-    joints = list(scene.joints)
-    _, b, c = joints[joint].rotational_stiffness
-    joints[joint] = replace(joints[joint], rotational_stiffness=(0.0, b, c))
-    return replace(scene, joints=tuple(joints))
+    _, b, c = scene.joints[joint].rotational_stiffness
+    return with_part(scene, "joints", joint, rotational_stiffness=(0.0, b, c))
 
 
 def on_soft_ground(scene, turning):
     """The scene on a first ground end of that rotational stiffness, N m/rad."""
-    first, *others = scene.grounds
-    soft = replace(first, rotational_stiffness=(turning, turning, turning))
-    return replace(scene, grounds=(soft, *others))
+    return with_part(scene, "grounds", 0, rotational_stiffness=(turning,) * 3)
 
 
 def all_nodes(net, bricks):

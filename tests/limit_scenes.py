@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import seqopt
-from tests.builders import on_soft_ground
+from tests.builders import on_soft_ground, with_part
 
 Grips = tuple[int, ...]
 LOOSE_AT = 11  # the joint that is loosened: between bricks 12 and 13 of 25
@@ -20,15 +20,10 @@ def chain(count: int, **shape: object) -> seqopt.Scene:
 
 def loosened(scene: seqopt.Scene, factor: float, *, only_turning: bool) -> seqopt.Scene:
     """Return the scene with one joint's stiffness multiplied."""
-    joints = list(scene.joints)
-    joint = joints[LOOSE_AT]
-    a, b, c = joint.rotational_stiffness
-    joint = replace(joint, rotational_stiffness=(factor * a, factor * b, factor * c))
-    if not only_turning:
-        a, b, c = joint.translational_stiffness
-        joint = replace(joint, translational_stiffness=(factor * a, factor * b, factor * c))
-    joints[LOOSE_AT] = joint
-    return replace(scene, joints=tuple(joints))
+    kinds = ["rotational_stiffness", *(["translational_stiffness"] if not only_turning else [])]
+    joint = scene.joints[LOOSE_AT]
+    change = {kind: tuple(factor * k for k in getattr(joint, kind)) for kind in kinds}
+    return with_part(scene, "joints", LOOSE_AT, **change)
 
 
 def far_grips(count: int) -> tuple[Grips, ...]:

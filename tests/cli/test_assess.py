@@ -3,7 +3,6 @@
 import json
 import math
 import signal
-from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
 
@@ -18,6 +17,7 @@ from seqopt.plan import _answers
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.work.progress import INTERRUPT, TIME, Clock
+from tests.builders import with_part
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
@@ -53,9 +53,8 @@ def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
 def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, fall, said):
     """It was left out without a word; of ground at rest nothing is said."""
     scene = load_scene(ARCH)
-    first, second = scene.grounds
-    down = replace(second, movement=(0.0, 0.0, fall))
-    save_scene(replace(scene, grounds=(first, down)), path := tmp_path / "settled.json")
+    down = with_part(scene, "grounds", 1, movement=(0.0, 0.0, fall))
+    save_scene(down, path := tmp_path / "settled.json")
     words = [str(path), "--method", "sequential", "--out", str(tmp_path / "x.csv")]
     assert main(["assess", *words]) == 0
     start = (

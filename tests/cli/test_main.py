@@ -18,7 +18,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.methods import sequential
 from seqopt.study import printed_steps
-from tests.builders import anywhere, from_both_ends, hinged
+from tests.builders import anywhere, from_both_ends, hinged, on_soft_ground
 from tests.commands import beside_models, command
 from tests.commands import command as run
 
@@ -263,9 +263,7 @@ def test_a_failed_solver_is_a_mechanism_only_where_one_is_proven():
 
 def test_where_every_step_is_one_there_is_still_a_table(capsys, tmp_path):
     scene = load_scene(ARCH)
-    ground = replace(scene.grounds[0], rotational_stiffness=(0.0, 0.0, 0.0))
-    path, grounds = tmp_path / "hinge.json", (ground, *scene.grounds[1:])
-    save_scene(replace(scene, grounds=grounds), path)
+    save_scene(on_soft_ground(scene, 0.0), path := tmp_path / "hinge.json")
     plan = first_steps(tmp_path / "plan.csv", 1)
     status, out, _ = command(capsys, "analyze", path, "--plan", plan, "--json")
     found = json.loads(out)

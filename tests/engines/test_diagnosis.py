@@ -36,7 +36,15 @@ from seqopt.engines.rigid.compliance import _EVEN, _LARGE, ComplianceEngine, _ca
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Load
-from tests.builders import apart, from_both_sides, hinged, running_bond, six_bricks, solve_batch
+from tests.builders import (
+    apart,
+    from_both_sides,
+    hinged,
+    running_bond,
+    six_bricks,
+    solve_batch,
+    with_part,
+)
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
 from tests.strategies import arches, both_sided, walls
@@ -348,8 +356,8 @@ def loaded(scene):
     last = scene.build_order[-1]
     late = Load(brick=2, force=(3.0, 0.0, -50.0), since=last)
     loads = (late, Load(brick=3, force=(0.0, 8.0, 0.0)))
-    sinks = replace(scene.grounds[0], movement=(1e-4, 0.0, -2e-4))
-    return replace(scene, loads=loads, wind=(0.1, 0.2, 0.0), grounds=(sinks, *scene.grounds[1:]))
+    sinks = with_part(scene, "grounds", 0, movement=(1e-4, 0.0, -2e-4))
+    return replace(sinks, loads=loads, wind=(0.1, 0.2, 0.0))
 
 
 SCENES = {
@@ -400,10 +408,8 @@ def test_what_blocks_get_wrong_is_corrected_or_refused():
 def test_what_hardly_holds_is_answered_right_or_not_at_all(softer):
     scene, rng = SCENES["chain"](), np.random.default_rng(0)
     for joint in (2, 9):
-        own = scene.joints[joint]
-        turns = tuple(softer * k for k in own.rotational_stiffness)
-        joints = (*scene.joints[:joint], replace(own, rotational_stiffness=turns))
-        network = build_network(replace(scene, joints=(*joints, *scene.joints[joint + 1 :])))
+        turns = tuple(softer * k for k in scene.joints[joint].rotational_stiffness)
+        network = build_network(with_part(scene, "joints", joint, rotational_stiffness=turns))
         system, count = FrontalSystem(network, AT_ONCE), len(network.inner)
         for held in range(3):
             nodes = rng.choice(np.arange(2, 2 * count - 1), held, replace=False)

@@ -22,7 +22,7 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
 from seqopt.sweep import sweep
 from seqopt.workflow import Robust
-from tests.builders import Counting, small_arch
+from tests.builders import Counting, small_arch, with_part
 from tests.layered import Costs
 
 
@@ -83,8 +83,7 @@ ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 def settled(fall=-0.005, payload=None, bricks=7):
     """An arch whose second end sinks, m; by default robots carry what they are given."""
     scene = small_arch(bricks)
-    first, second = scene.grounds
-    scene = replace(scene, grounds=(first, replace(second, movement=(0.0, 0.0, fall))))
+    scene = with_part(scene, "grounds", 1, movement=(0.0, 0.0, fall))
     strong = (replace(robot, payload=payload or robot.payload) for robot in scene.robots)
     return scene.with_robots(*strong)
 

@@ -3,6 +3,7 @@
 import json
 import warnings
 from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import _find_warnings, _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes
-from tests.builders import running_bond, six_bricks
+from tests.builders import running_bond, six_bricks, with_part
 from tests.strategies import arches, flat_arches, scenes_with_all, walls
 
 TEXT = dump_scene(six_bricks())
@@ -225,22 +226,17 @@ def test_files(tmp_path, arch25):
 SCENE = six_bricks()
 
 
-def with_part(kind, index, **change):
-    parts = list(getattr(SCENE, kind))
-    parts[index] = replace(parts[index], **change)
-    return replace(SCENE, **{kind: tuple(parts)})
-
-
+with_own = partial(with_part, SCENE)
 ODD = {
-    "joint (2, 3): it lies 1e+06 m from brick 2": with_part("joints", 1, position=(1e6, 0.0, 0.0)),
-    "ground end of brick 1: it lies": with_part("grounds", 0, position=(0.0, 3.0, 0.0)),
-    "bricks 2 and 4 interpenetrate by 89.6 mm": with_part(
+    "joint (2, 3): it lies 1e+06 m from brick 2": with_own("joints", 1, position=(1e6, 0.0, 0.0)),
+    "ground end of brick 1: it lies": with_own("grounds", 0, position=(0.0, 3.0, 0.0)),
+    "bricks 2 and 4 interpenetrate by 89.6 mm": with_own(
         "bricks", 3, position=SCENE.bricks[1].position
     ),
-    "brick 1: dimensions of (246.0, 116.0, 53.0) m look like millimeters": with_part(
+    "brick 1: dimensions of (246.0, 116.0, 53.0) m look like millimeters": with_own(
         "bricks", 0, dimensions=(246.0, 116.0, 53.0)
     ),
-    "brick 3: a density of 2.42 kg/m³ is odd": with_part("bricks", 2, density=2.42),
+    "brick 3: a density of 2.42 kg/m³ is odd": with_own("bricks", 2, density=2.42),
     "gravity is 9810 m/s²": replace(SCENE, gravity=(0.0, 0.0, -9810.0)),
 }
 

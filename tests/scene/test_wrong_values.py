@@ -12,7 +12,7 @@ from seqopt.scene.arch import ArchShape
 from seqopt.scene.library import ArchForm, JointLaw, WallShape
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
-from tests.builders import six_bricks
+from tests.builders import six_bricks, with_part
 
 SCENE = six_bricks()
 CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -79,13 +79,6 @@ def test_what_is_given_beside_a_file_is_named(tmp_path, given, said):
 
 
 # where the parts of a scene lie: what leaves nothing to compute is refused in the scene
-def with_part(scene, kind, index, **change):
-    """The scene with one brick, joint or ground end changed."""
-    parts = list(getattr(scene, kind))
-    parts[index] = replace(parts[index], **change)
-    return replace(scene, **{kind: tuple(parts)})
-
-
 NODE = SCENE.node_position(3)
 
 
