@@ -29,10 +29,6 @@ class RigidStructure:
     inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
     statics: Statics  # of the network
 
-    def forbidden(self, grips: Ints) -> Floats:
-        """Return the motions (3r, 6b) that grips forbid."""
-        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
-
 
 def solve_dense(
     network: Network, bricks: int, columns: Ints, compliance: GripCompliance = RIGID
@@ -42,7 +38,12 @@ def solve_dense(
     Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
-    parts = rigid_structure(network, bricks)
+    acting, gap, stiffness = spring_maps(network, bricks)
+    matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
+    motion = node_motion(network, bricks).toarray()
+    inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
+    statics = build_statics(network)
+    parts = RigidStructure(acting, gap, stiffness, matrix, motion, inner, statics)
     if compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
     far = compliance.offsets(*columns.shape)
@@ -58,9 +59,9 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     pull += network.applied(bricks).ravel()
     moved = network.springs.movement[parts.acting]
     pull += np.einsum("sij,sik,sk->j", parts.gap, parts.stiffness, moved)
-    forbidden = parts.forbidden(grips)
+    forbidden = parts.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()]  # (3r, 6b)
     values, vectors, motions = resisting_modes(parts.matrix, forbidden)
-    if lost_to_rounding(values):
+    if len(values) and not values[0] > _ROUNDING * values[-1]:  # all may be zero
         require_resistance(network, bricks, grips)
         raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
     taken = np.zeros_like(pull)
@@ -79,20 +80,6 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
     solution = Solution(twist[None], wrench[None], force[None])
     return respond(network, parts.statics, parts.motion, grips[None], solution)
-
-
-def rigid_structure(network: Network, bricks: int) -> RigidStructure:
-    """Return the parts of the stiffness of a partial structure."""
-    acting, gap, stiffness = spring_maps(network, bricks)
-    matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
-    motion = node_motion(network, bricks).toarray()
-    inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
-    return RigidStructure(acting, gap, stiffness, matrix, motion, inner, build_statics(network))
-
-
-def lost_to_rounding(values: Floats) -> bool:
-    """Return whether the least of ascending eigenvalues may be rounding alone."""
-    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:

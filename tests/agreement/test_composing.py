@@ -233,7 +233,11 @@ def free_labels(rules, allow, words):
         if not any(known is each for each in labels[at]):
             continue
         for after in graph[at]:
-            add = np.array([of_move(graph, at, after, word) for word in words])
+            add = np.zeros(len(words))
+            if after != "end":
+                data, worst = graph.edges[at, after], graph.nodes[after]["worst"]
+                moves = {"steps": 1.0, "regrips": data["regrip"], "travel": data["way"]}
+                add = np.array([moves[w] if w in moves else taken(w, worst) for w in words])
             new = np.where(peak, np.maximum(known, add), known + add)
             old = labels.setdefault(after, [])
             if any((each <= new * (1 + 1e-12)).all() for each in old):
@@ -241,14 +245,6 @@ def free_labels(rules, allow, words):
             labels[after] = [each for each in old if not (new <= each).all()] + [new]
             work.append((after, new))
     return labels.get("end", [])
-
-
-def of_move(graph, at, after, word):
-    if after == "end":
-        return 0.0
-    data = graph.edges[at, after]
-    moves = {"steps": 1.0, "regrips": data["regrip"], "travel": data["way"]}
-    return moves[word] if word in moves else taken(word, graph.nodes[after]["worst"])
 
 
 def best_of(plans, aims, caps):

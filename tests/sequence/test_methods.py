@@ -173,16 +173,15 @@ def grows_from_what_is_held(network, steps):
             continue
         newest = step.bricks - 1
         held = {index[scene.brick_of_node[node].name] for node in step.grips if node is not None}
-        if not any(newest in _since(pairs, start, newest) for start in held):
+        joined = set()
+        for start in held:  # what is linked to it by bricks that came since
+            found = {start}
+            for _ in range(start, newest + 1):
+                found |= {b for pair in pairs if pair & found for b in pair if start <= b <= newest}
+            joined |= found
+        if newest not in joined:
             out.append(step.number)
     return out
-
-
-def _since(pairs, start, newest):
-    found = {start}
-    for _ in range(start, newest + 1):
-        found |= {b for pair in pairs if pair & found for b in pair if start <= b <= newest}
-    return found
 
 
 CROSS = [*range(1, 7), *range(12, 6, -1)]  # one side of an arch, then the other
