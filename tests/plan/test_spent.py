@@ -21,7 +21,7 @@ from seqopt.responses import _grip_sets
 from seqopt.responses._grip_sets import GripSets, Resources
 from seqopt.stability.standing import StandingSets
 from seqopt.workflow import Search
-from tests.builders import hinged
+from tests.builders import hinged, small_arch
 from tests.commands import command
 
 SMALL = "chain:bricks=7"
@@ -144,7 +144,7 @@ def test_corrections_are_counted_wherever_they_are_made(records):
 
 @pytest.mark.parametrize("count", [0, 2])
 def test_verdicts_are_counted_in_all_scenarios(records, count):
-    scene = seqopt.load_scene("chain:bricks=6")
+    scene = small_arch(4)
     worlds = seqopt.scenarios(scene, count=count, seed=1).scenes if count else ()
     problem = seqopt.optimize(scene, "free", aim="minmax", stands="dry").problem
     records.verdicts.clear()
@@ -168,7 +168,7 @@ def test_a_pareto_set_solves_every_model_once_and_says_so(records, tmp_path, cap
 
 
 def test_commands_say_it_in_one_line_where_details_are_asked(records, tmp_path, capsys):
-    words = ("optimize", SMALL, "--schedule", "free", "--aim", "makespan")
+    words = ("optimize", "chain:bricks=6", "--schedule", "free", "--aim", "makespan")
     words += ("--durations", "fetch=30,place=10,approach=10,grip=5,release=5")
     assert "spent:" not in command(capsys, *words, "--no-stability")[2]
     words += ("--out", tmp_path / "timed", "--details")
