@@ -66,36 +66,32 @@ def judge_instance(
     (657.46456, 0.0)
     """
     graph = read_instance(instance) if isinstance(instance, Path | str) else instance
-    return judge_path(graph, as_answer(graph, solution, () if bounds is None else bounds))
-
-
-def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
-    """Parse a solution with its bounds; raise a `ProblemError` that names an invalid entry."""
     found, where = _loaded(solution)
     held = found if isinstance(found, Mapping) else {"nodes": found}
     _require_known(where, held, (*WHAT, "values", "bounds", "instance"))
     named = [what for what in WHAT if what in held]
     if len(named) != 1:
         raise ProblemError(f"{where}: give one of {', '.join(WHAT)}")
-    own = isinstance(bounds, Sequence) and not len(bounds)
+    own = bounds is None or (isinstance(bounds, Sequence) and not len(bounds))
     claims, said = (held.get("bounds", ()), where) if own else _loaded(bounds)
     if isinstance(claims, Mapping):
         claims = claims.get("bounds", [claims])
     if isinstance(claims, str) or not isinstance(claims, Sequence):
         raise ProblemError(f"{said}: bounds are {short(claims)}; give a list, one for every goal")
-    names, values = [goal.name for goal in instance.goals], held.get("values", ())
+    names, values = [goal.name for goal in graph.goals], held.get("values", ())
     if isinstance(values, Mapping):
         _require_known(f"{where}, values", values, names)
         values = [values.get(name, np.inf) for name in names]
     known = _numbers(f"{where}, values", values).tolist()
     if len(known) > len(names):
         raise ProblemError(f"{where}: {len(known)} values for {len(names)} goals; leave some out")
-    return Answer(
+    answer = Answer(
         named[0],
         _numbers(f"{where}, {named[0]}", held[named[0]], whole=True),
         tuple(value if np.isfinite(value) else None for value in known),
         tuple(_claim(f"{said}, bound {k}", each) for k, each in enumerate(claims, start=1)),
     )
+    return judge_path(graph, answer)
 
 
 def _loaded(given: Any) -> tuple[Any, str]:
