@@ -19,6 +19,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import (
     FLAGS,
@@ -30,7 +31,6 @@ from seqopt._cli.words import (
     VALUES,
     parse_count,
 )
-from seqopt._registry import COMMANDS
 from seqopt.problem.requirements import number_word
 
 OWN = "What is it about?"  # of options under no question

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._archives import Archive
 from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt.arms._archives import Archive
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import UP, ArmModel, arm_model
 from seqopt.arms._postures import PostureTable, choose

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt._registry import Later
+from seqopt.arms._archives import Archive
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, _Target
 from seqopt.instances._program import as_mps
