@@ -11,8 +11,8 @@ from seqopt.instances._files import read_instance as read_instance
 from seqopt.instances._files import save_instance as save_instance
 from seqopt.instances.answers import judge_instance as judge_instance
 from seqopt.instances.compiled import compile_instance as compile_instance
-from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
+from seqopt.network.network import build_network as build_network
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solve import pose as pose

@@ -16,8 +16,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.formulation import Formulation, Run, as_formulation, find_formulation
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import _solve_run, default_formulation, pose
 from seqopt.problem.amounts import parse_goals

@@ -17,8 +17,7 @@ from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._candidates import CandidateCosts
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.problem.amounts import (
     LARGEST,
     NONE,

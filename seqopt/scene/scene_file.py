@@ -73,8 +73,9 @@ def warn_of(scene: Scene, name: str) -> None:
 def _find_overlapping(scene: Scene) -> Iterator[str]:
     """Yield a line on each pair of bricks that interpenetrate by more than `TOLERATED`.
 
-    A joint without a face is checked with its bricks in `seqopt.contact.faces`: those of arches may
-    run into each other at their corners. Beams do by intent: bricks with a shape and such joints.
+    A joint without a face is checked with its bricks in `seqopt.contact.assembly`: those of arches
+    may run into each other at their corners. Beams do by intent: bricks with a shape and such
+    joints.
     """
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     faceless = [spring.ends for spring in springs if spring.face is None]

@@ -14,8 +14,7 @@ from itertools import permutations
 import numpy as np
 
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.build import network_of
-from seqopt.network.network import Network, PartKind
+from seqopt.network.network import Network, PartKind, network_of
 from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene, _reachable, _within_reach
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support

@@ -3,7 +3,7 @@
 The paper is arXiv 2104.04856. No other part of seqopt uses numbers from it.
 
 >>> from seqopt.engines.registry import make_engine
->>> from seqopt.network.build import build_network
+>>> from seqopt.network.network import build_network
 >>> from seqopt.responses.table import analyze
 >>> from seqopt.scene.scene_file import load_scene
 >>> from seqopt.study import CRITERIA, printed_maxima, published_plan

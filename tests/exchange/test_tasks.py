@@ -19,7 +19,7 @@ from seqopt.exchange._grip_frames import hold
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence

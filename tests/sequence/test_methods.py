@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import StepError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot, Sphere
