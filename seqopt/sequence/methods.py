@@ -131,25 +131,6 @@ def lies_along(network: Network) -> frozenset[int]:
     return frozenset(brick.name for brick in network.scene.placed if met.issuperset(brick.nodes))
 
 
-def _begins_elsewhere(network: Network) -> frozenset[int]:
-    """Return the names of bricks at which the cantilever method turns to another part.
-
-    A stretch is a brick that is held while others are placed, and these others. A brick begins
-    elsewhere if no joint ties it to the stretch that is being built; so does the first one.
-    """
-    springs, tied = network.springs, defaultdict[int, set[int]](set)
-    for a, b in springs.bodies[springs.stiffness.any(axis=1)].tolist():
-        tied[b].add(a)  # the lower one first
-    along, stretch, out = lies_along(network), set[int](), set[int]()
-    for k, brick in enumerate(network.scene.placed):
-        if stretch.isdisjoint(tied[k]):
-            out.add(brick.name)
-        if brick.name in along | out:
-            stretch = set()
-        stretch.add(k)
-    return frozenset(out)
-
-
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     """Return the node at which a robot holds a brick that it places.
 
@@ -294,7 +275,14 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
     network = network_of(network)
-    swaps = lies_along(network) | _begins_elsewhere(network)
+    springs, tied = network.springs, defaultdict[int, set[int]](set)
+    for a, b in springs.bodies[springs.stiffness.any(axis=1)].tolist():
+        tied[b].add(a)  # the lower one first
+    swaps, stretch = {*lies_along(network)}, set[int]()  # what is held while others are placed
+    for k, brick in enumerate(network.scene.placed):
+        if stretch.isdisjoint(tied[k]):  # it begins elsewhere; so does the first one
+            swaps.add(brick.name)
+        stretch = {k} if brick.name in swaps else stretch | {k}
     steps = _alternate(network, "cantilever", swaps, robots)
     return open_schedule("cantilever", network, steps).fill(())
 

@@ -19,7 +19,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
-from seqopt.sequence.schedule import Move, Near
+from seqopt.sequence.schedule import Move, near_nodes, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -81,7 +81,7 @@ class FreeRules:
         and once a state violates them, only release; also if a build begins in such a state.
     candidates : str
         At which nodes placed bricks may be gripped: ``near:6``, as of
-        `seqopt.sequence.schedule.Near`; by default wherever robots reach.
+        `seqopt.sequence.schedule.thin`; by default wherever robots reach.
     begin : Site or None
         Where the build begins; by default with the empty site. This state need not keep rules or
         limits; until rules are kept for the first time, robots may only take grips, except where
@@ -144,7 +144,7 @@ class FreeRules:
             if not isinstance(getattr(self, name), Site | None):
                 raise StepError(f"rule {name}: {short(getattr(self, name))}; give a seqopt.Site")
         if self.candidates:
-            settle(self, candidates=Near(self.candidates).rule)
+            settle(self, candidates=near_rule(self.candidates))
 
     def span(self, scene: Scene) -> tuple[int, int]:
         """Return the brick counts at the beginning and at the end of the build."""
@@ -216,9 +216,9 @@ class FreeRules:
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of the placed bricks that may be gripped."""
         nodes = scene.placed_nodes[: 2 * bricks]
-        if not self.candidates or not nodes:
-            return frozenset(nodes)
-        return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
+        if self.candidates and nodes:
+            nodes = near_nodes(self.candidates, scene, bricks, nodes)
+        return frozenset(nodes)
 
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return the indices of the participating robots of a scene, ascending."""
@@ -250,9 +250,8 @@ class FreeRules:
 
     def fewest_grips(self, scene: Scene) -> int:
         """Return the least number of grips, from the second brick on."""
-        if self.least_grips is not None:
-            return self.least_grips
-        return _usual_grips(len(self.team(scene)))
+        usual = _usual_grips(len(self.team(scene)))
+        return usual if self.least_grips is None else self.least_grips
 
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON. Result: by name."""

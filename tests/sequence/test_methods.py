@@ -296,7 +296,7 @@ def test_schedules_are_checked(loop25):
         loop25.fill((1, 2, 3))
     far = replace(loop25.steps[0], grips=(OpenGrip(0), OpenGrip(5), None))
     with pytest.raises(StepError, match="at most two neighboring"):
-        Schedule("x", loop25.scene, (far,), loop25.moves).require_pairs()
+        Schedule("x", loop25.scene, (far,), loop25.moves).names_robots(in_pairs=True)
 
 
 # fewer candidates: those near the newest bricks, never none, and the schedule says so
