@@ -229,7 +229,8 @@ class Scene(Shown):
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
         """Return the nodes that a robot reaches, brick by brick in build order.
 
-        Nodes that are blocked, or held by props, are not among them.
+        Nodes that are blocked, or held by props, are not among them. That of an arm is in reach if
+        a posture of it is possible when the brick is placed.
         """
         known: dict[Reach, tuple[tuple[int, ...], ...]]
         known = self.__dict__.setdefault("reached", {})
@@ -240,7 +241,13 @@ class Scene(Shown):
                 tuple(n for n in b.nodes if n not in blocked and covers(b.node_position(n)))
                 for b in self.placed
             )
-        return known[robot.reach]
+        if robot.arm is None:
+            return known[robot.reach]
+        until = from_arms("permits")(self).until[self.robots.index(robot)]
+        return tuple(
+            tuple(n for i, n in enumerate(b.nodes) if n in own and until[2 * k + i + 1] > k + 1)
+            for k, (b, own) in enumerate(zip(self.placed, known[robot.reach], strict=True))
+        )
 
     @property
     def arms(self) -> tuple[Arm | None, ...]:
@@ -522,39 +529,14 @@ def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | No
         from_arms("find_postures")(scene, cache, tell)
 
 
-def _within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
-    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
-
-    That of an arm is in reach if a posture of it is possible when the brick is placed.
-    """
-    own = scene.within_reach(robot)
-    if robot.arm is None:
-        return own
-    until = from_arms("permits")(scene).until[scene.robots.index(robot)]
-    return tuple(
-        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
-        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
-    )
-
-
 def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
-    nodes = tuple(node for brick in _within_reach(scene, robot)[:bricks] for node in brick)
+    nodes = tuple(node for brick in scene.within_reach(robot)[:bricks] for node in brick)
     if robot.arm is None:
         return nodes
     until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
-
-
-def _go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
-    """Return which states (n,) of a scene with arms have postures that go together.
-
-    ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
-    none above 0 is a free robot.
-    """
-    out: Bools = from_arms("permits")(scene).allowed(bricks, held)
-    return out
 
 
 class _NoRules:

@@ -16,7 +16,7 @@ import numpy as np
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network, PartKind, network_of
 from seqopt.scene.parts import Brick, Robot, Side
-from seqopt.scene.scene import Scene, _reachable, _within_reach
+from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 
@@ -72,7 +72,7 @@ def _take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if _within_reach(scene, scene.robots[robot])[k]}
+        able = {robot for robot in rank if scene.within_reach(scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
@@ -100,7 +100,7 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
 
     Bricks are indices in build order; of all assignments the lexicographically first, by role.
     """
-    reach = {r: _within_reach(scene, scene.robots[r]) for r in robots}
+    reach = {r: scene.within_reach(scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
 
     @cache  # as many calls as there are sets of robots, not orders
@@ -137,7 +137,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
     """
-    free = _within_reach(network.scene, robot)[network.scene.since[brick.name] - 1]
+    free = network.scene.within_reach(robot)[network.scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
