@@ -121,22 +121,19 @@ class Search:
 
     @property
     def memory(self) -> float | None:
-        """The memory that it may take, bytes."""
-        return _parse_size(self.max_memory) if isinstance(self.max_memory, str) else self.max_memory
+        """The memory that it may take, bytes; sizes are as ``2GB``, ``500 MB`` or ``1.5GiB``.
 
-
-def _parse_size(text: str) -> float:
-    """Parse a size, as ``2GB``, ``500 MB`` or ``1.5GiB``, into bytes.
-
-    >>> _parse_size("1.5GB")
-    1500000000.0
-    """
-    found = SIZE.fullmatch(text.strip())
-    if found is None or not 0 < float(found[1]) < LARGEST:
-        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
-    unit = found[2].upper()
-    power = "BKMGT".find(unit[:1] or "B")
-    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
+        >>> Search(max_memory="1.5GB").memory
+        1500000000.0
+        """
+        if not isinstance(text := self.max_memory, str):
+            return text
+        found = SIZE.fullmatch(text.strip())
+        if found is None or not 0 < float(found[1]) < LARGEST:
+            raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
+        unit = found[2].upper()
+        power = "BKMGT".find(unit[:1] or "B")
+        return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
 def parse_numbers(

@@ -103,13 +103,6 @@ class Assembly(FrozenValue):
         settle(out, bond=frozen(np.array(shares, dtype=float)))
         return out
 
-    @classmethod
-    def cut(cls, **values: Any) -> Assembly:
-        """Return a part of an assembly that was checked, with cached values that are known."""
-        out = cls.__new__(cls)
-        out.__setstate__(values)
-        return out
-
     @cached_property
     def corner_area(self) -> Floats:
         """Area of the face that each corner represents, (K,) m².
@@ -457,15 +450,11 @@ class PartialAssemblies:
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
         """Return a partial structure with the grips that hold it; those made last are kept."""
-        key = bricks, (*grips,)
-        if key not in self._made:
-            if len(self._made) >= max(_KEPT // bricks, 1):
-                self._made.clear()
-            self._made[key] = self._cut(*key)
-        return self._made[key]
-
-    def _cut(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        whole = self._whole
+        key, whole = (bricks, (*grips,)), self._whole
+        if key in self._made:
+            return self._made[key]
+        if len(self._made) >= max(_KEPT // bricks, 1):
+            self._made.clear()
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
         ends = (
@@ -482,10 +471,12 @@ class PartialAssemblies:
         kept = slice(0, int(columns[-1]))
         ratio = np.where(self._turning[kept], whole.scales[1] / scales[1], 1.0)  # of levers
         entries = self._map.data[kept] * ratio, self._map.indices[kept], columns
-        return Assembly.cut(
-            **{name: getattr(whole, name)[:end] for end, names in ends for name in names},
-            **fields,
-            bond=np.zeros(0),
-            scales=scales,
-            contact_map=sparse.csc_array(entries, shape=(6 * bricks, 3 * corners)).tocsr(),
+        part = Assembly.__new__(Assembly)  # of what was checked, with cached values that are known
+        part.__setstate__(
+            {name: getattr(whole, name)[:end] for end, names in ends for name in names}
+            | fields
+            | {"bond": np.zeros(0), "scales": scales}
+            | {"contact_map": sparse.csc_array(entries, shape=(6 * bricks, 3 * corners)).tocsr()}
         )
+        self._made[key] = part
+        return part

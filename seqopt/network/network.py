@@ -390,7 +390,11 @@ def _double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
         for number in brick.nodes:
             graph.add_node(number, **_NodeData(**own, position=brick.node_position(number)))
         graph.add_edge(*brick.nodes, **own)
-    for s, (name, (spring, since)) in enumerate(zip(_joint_names(springs), springs, strict=True)):
+    alike = Counter[tuple[object, ...]]()  # springs that join the same bodies are counted
+    for s, (spring, since) in enumerate(springs):
+        joined = spring.bricks if isinstance(spring, Joint) else ("ground", spring.brick)
+        alike[joined] += 1
+        name = ("joint", *joined, *([alike[joined]] if alike[joined] > 1 else []))
         ends, at = [scene.since[b] for b in spring.ends], spring.position
         own = _PartData(kind=PartKind.JOINT, since=min(ends), spring=s, brick=-1)
         graph.add_node(name, **_NodeData(**own, position=at))
@@ -438,17 +442,6 @@ def _compile(scene: Scene, graph: DoubleCross, springs: _Springs, support: Ints)
         weight=mass * (scene.weight_factor * np.array(scene.gravity)),
         **arrays,
     )
-
-
-def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
-    """Return a name for every spring; those that join the same bodies are counted."""
-    names: list[tuple[object, ...]] = []
-    alike = Counter[tuple[object, ...]]()
-    for spring, _ in springs:
-        name = spring.bricks if isinstance(spring, Joint) else ("ground", spring.brick)
-        alike[name] += 1
-        names.append(("joint", *name, *([alike[name]] if alike[name] > 1 else [])))
-    return names
 
 
 def _springs(scene: Scene, springs: _Springs, support: Ints, node: Ints) -> Springs:
