@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Container, Mapping
 from importlib import import_module
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from seqopt.errors import ExtraError, PluginWarning, message_of, plugins
 
@@ -95,10 +95,7 @@ class Part:
     """Base of parts that packages and users register by name: formats, commands."""
 
     name: str
-
-    def reserved(self) -> Container[str]:
-        """Return names that are always there."""
-        raise NotImplementedError
+    built_in: ClassVar[Container[str]]  # names of the parts that are always there
 
 
 def load(place: str) -> Any:

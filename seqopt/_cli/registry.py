@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -35,10 +35,6 @@ class Command(Part):
 
     def __repr__(self) -> str:
         return f"Command({self.name!r})"
-
-    def reserved(self) -> Container[str]:
-        """Return the names of the commands that are always there."""
-        return COMMANDS
 
     @property
     def line(self) -> str:
@@ -73,6 +69,7 @@ COMMANDS = {
     )
 }
 """The commands that are always there, by name."""
+Command.built_in = COMMANDS
 
 
 def every_command() -> dict[str, Command]:

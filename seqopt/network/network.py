@@ -177,6 +177,8 @@ class Network(Shown, FrozenValue):
     edge_brick: Ints
     edge_spring: Ints
     weight: Floats
+    derived: dict[str, Any] = field(default_factory=dict, init=False, compare=False)
+    """Values that outer rooms derive from the network alone and cache with it, by name."""
 
     def __repr__(self) -> str:
         bricks = f"{len(self.inner)} bricks, {len(self.springs.since)} springs"
@@ -270,11 +272,6 @@ class Network(Shown, FrozenValue):
         """Unit vectors along the edges, (E, 3)."""
         step = np.diff(self.node_position[self.edge_nodes], axis=1)[:, 0]
         return frozen(units(step))
-
-    @cached_property
-    def derived(self) -> dict[str, Any]:
-        """Values that outer rooms derive from the network alone and cache with it, by name."""
-        return {}
 
     @cached_property
     def lever(self) -> float:

@@ -364,10 +364,10 @@ class Scene(Shown):
     @cached_property
     def grip_kinds(self) -> _GripKinds:
         """Compliance of its robots where they hold, and after them of its props."""
-        soft = (r.name if r.arm and r.arm.joint_stiffness else "" for r in self.robots)
+        alone = (r.name if r.arm and r.arm.joint_stiffness else "" for r in self.robots)
         own = [
             (r.stiffness, r.rotational_stiffness, r.payload, name)
-            for r, name in zip(self.robots, soft, strict=True)
+            for r, name in zip(self.robots, alone, strict=True)
         ]
         any_force = math.nextafter(math.inf, 0)
         own += [(p.stiffness, None, p.capacity or any_force, "") for p in self.props]
@@ -378,14 +378,17 @@ class Scene(Shown):
             for at, each in zip((0, 3), given, strict=True):
                 if each is not None:
                     compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(each)
+        soft, turns = np.array(arms) != "", np.array([each is not None for each in turn])
         return _GripKinds(
             compliance=compliance,
-            arms=np.array(arms) != "",
-            turns=np.array([each is not None for each in turn]),
+            arms=soft,
+            turns=turns,
             payload=np.array(payload),
             of_robot=np.array([kinds.index(each) for each in own], dtype=np.int64),
             first=min(self.brick_of_node),
             span=max(self.brick_of_node) - min(self.brick_of_node) + 1,
+            rigid=not (compliance.any() or turns.any() or soft.any()),
+            gives=compliance[:, :3, :3].any(axis=(1, 2)) | soft,
         )
 
     @cached_property

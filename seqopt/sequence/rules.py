@@ -19,7 +19,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
-from seqopt.sequence.schedule import Move, near_nodes, near_rule
+from seqopt.sequence.schedule import Move, OpenStep, near_nodes, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -271,6 +271,7 @@ class FreeRules:
         }
 
     method, has_pairs = FREE, False  # it is no list of steps with open grips
+    steps: ClassVar[tuple[OpenStep, ...]] = ()
     moves: ClassVar[tuple[Move, ...]] = ()
 
     @property
@@ -281,10 +282,6 @@ class FreeRules:
     def names_robots(self, *, in_pairs: bool = False) -> bool:
         """Return whether states say which robot holds: not of those that are alike."""
         return False
-
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of a table of steps: none."""
-        return {}
 
     def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
         """Raise a `ProblemError`: there are no moves to be chosen."""

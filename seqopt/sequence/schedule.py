@@ -174,11 +174,6 @@ class Schedule(Shown):
                 )
         return True
 
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of a table of steps: the robots whose grips were open."""
-        own = {s.number: ";".join(self.moves[m].robot for m in s.moves) for s in self.steps}
-        return {"optimized_robot": [own.get(step.number, np.nan) for step in steps]}
-
     def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
         """Return the node that every move takes in a sequence."""
         grips = {step.number: step.grips for step in steps}

@@ -12,8 +12,7 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene import _checks
-from seqopt.scene._checks import MOST_BRICKS, check, stiffness
+from seqopt.scene._checks import MOST_BRICKS, check, finite, kind_of, stiffness
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.parts import Brick, Robot
 
@@ -64,12 +63,8 @@ MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def _joint_width(where: str, value: float) -> float:
-    """Return the width of a joint, which may be none."""
-    return 0.0 if _checks.as_float(value) == 0 else _checks.positive(where, value, "m, or 0")
-
-
-a_law = partial(_checks.kind_of, kind=JointLaw)
+_joint_width = partial(finite, least=0.0, wanted="a positive number of m, or 0")
+a_law = partial(kind_of, kind=JointLaw)
 
 
 def _mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
