@@ -181,13 +181,16 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
 
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
     """Raise a `FileError` if two outputs are the same file, or one is an input."""
-    seen: list[Path] = []
-    for path in outputs:
-        if any(_is_same(path, other) for other in inputs):
-            raise FileError(f"cannot write {path}: it is the input; name another file")
-        if any(_is_same(path, other) for other in seen):
-            raise FileError(f"cannot write {path}: two outputs go there; name another file")
-        seen.append(path)
+    for i, path in enumerate(outputs):
+        others = [(each, "it is the input") for each in inputs]
+        others += [(each, "two outputs go there") for each in outputs[:i]]
+        for other, why in others:
+            try:
+                same = path.samefile(other)
+            except OSError:  # one of them is not there
+                same = os.path.realpath(path) == os.path.realpath(other)
+            if same:
+                raise FileError(f"cannot write {path}: {why}; name another file")
 
 
 def require_folder(path: Path) -> None:
@@ -261,14 +264,6 @@ def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
     finally:
         for hidden, _ in staged:
             hidden.unlink(missing_ok=True)
-
-
-def _is_same(path: Path, other: Path) -> bool:
-    """Return whether two paths lead to the same file, which may not exist."""
-    try:
-        return path.samefile(other)
-    except OSError:  # one of them is not there
-        return os.path.realpath(path) == os.path.realpath(other)
 
 
 PAGE = "report.html"  # the page in a folder that a command writes

@@ -1,7 +1,7 @@
 """Methods: rules that turn a scene into the steps that build it, with given or with open grips.
 
 Roles (which robot places and which holds) are filled by reach or by name. A method lists its acts,
-and `_steps` makes steps of them.
+and `_schedule` makes steps of them.
 """
 
 from __future__ import annotations
@@ -149,16 +149,16 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-def _steps(scene: Scene, acts: Iterable[_Act]) -> list[OpenStep]:
-    """Return the steps of acts, numbered from 1; an act that changes no grip is none."""
-    grips: tuple[_Grip, ...] = (None,) * len(scene.robots)
-    out: list[OpenStep] = []
+def _schedule(method: str, network: Network, acts: Iterable[_Act]) -> Schedule:
+    """Return the schedule of acts, numbered from 1; an act that changes no grip is no step."""
+    grips: tuple[_Grip, ...] = (None,) * len(network.scene.robots)
+    steps: list[OpenStep] = []
     for kind, bricks, changes in acts:
         before = grips
         grips = tuple(changes.get(robot, grip) for robot, grip in enumerate(before))
         if grips != before:
-            out.append(OpenStep(len(out) + 1, kind, bricks, grips))
-    return out
+            steps.append(OpenStep(len(steps) + 1, kind, bricks, grips))
+    return open_schedule(method, network, steps)
 
 
 def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> Schedule:
@@ -191,8 +191,8 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
 
 def _alternate(
     network: Network, method: str, swaps: Set[int], robots: Sequence[str], *, open_: bool = False
-) -> list[OpenStep]:
-    """Return the steps in which two robots place and hold by turns, at placing or at open nodes.
+) -> Schedule:
+    """Return the schedule of two robots that place and hold by turns, at placing or at open nodes.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
     ``swaps``: names of bricks after which the robot that placed them holds on.
@@ -206,7 +206,7 @@ def _alternate(
         stays = placer if count == 1 or brick.name in swaps else holder
         leave = {*range(len(scene.robots))} - {stays if count < len(pairs) else -1}
         acts.append((StepKind.RELEASE, count, dict.fromkeys(leave)))
-    return _steps(scene, acts)
+    return _schedule(method, network, acts)
 
 
 def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -243,8 +243,7 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     (None, 2, 1)
     """
     network = network_of(network)
-    steps = _alternate(network, "sequential", {*network.scene.build_order}, robots)
-    return open_schedule("sequential", network, steps).fill(())
+    return _alternate(network, "sequential", {*network.scene.build_order}, robots).fill(())
 
 
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -283,8 +282,7 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
         if stretch.isdisjoint(tied[k]):  # it begins elsewhere; so does the first one
             swaps.add(brick.name)
         stretch = {k} if brick.name in swaps else stretch | {k}
-    steps = _alternate(network, "cantilever", swaps, robots)
-    return open_schedule("cantilever", network, steps).fill(())
+    return _alternate(network, "cantilever", swaps, robots).fill(())
 
 
 METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
@@ -300,9 +298,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     move after it; its candidates are the nodes of the brick that it places.
     """
     network = network_of(network)
-    every = {*network.scene.build_order}
-    steps = _alternate(network, "two-robot", every, robots, open_=True)
-    return open_schedule("two-robot", network, steps)
+    return _alternate(network, "two-robot", {*network.scene.build_order}, robots, open_=True)
 
 
 def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
@@ -351,7 +347,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
         acts.append((StepKind.RELEASE, count + move, {order[placer]: None}))
         place(placer, count + move + 1)
         acts.append((StepKind.RELEASE, count + move + 1, {order[oldest]: None}))
-    return open_schedule(f"{_in_words(count)}-robot", network, _steps(scene, acts))
+    return _schedule(f"{_in_words(count)}-robot", network, acts)
 
 
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
@@ -457,7 +453,7 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
                 )
             support, moves = {helper: OpenGrip(moves)}, moves + 1
             acts.append((StepKind.REPOSITION, step.bricks, given | support))
-    return open_schedule("modified-sequential", network, _steps(scene, acts))
+    return _schedule("modified-sequential", network, acts)
 
 
 SCHEDULES: dict[str, Callable[..., Schedule]] = {
