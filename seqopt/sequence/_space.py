@@ -52,24 +52,12 @@ class Moves(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """All choices of the grips that are open at a level, whether or not a build reaches them.
+    """All choices of the grips that are open at a level, whether or not a build reaches them."""
 
-    Attributes
-    ----------
-    columns : tuple of int
-        Columns of the robots whose grips are open, those that were taken first before others.
-    places : tuple of (C,) int
-        The places that each of them may hold.
-    states : (P, c) int
-        States of the possible choices: a place for each robot that no other one holds.
-    possible : (C,) or (C, D) bool
-        Which choices these are, in the same order.
-    """
-
-    columns: tuple[int, ...]
-    places: tuple[Ints, ...]
-    states: Ints
-    possible: Bools
+    columns: tuple[int, ...]  # of the robots whose grips are open, those taken first before others
+    places: tuple[Ints, ...]  # (C,) each; the places that each of them may hold
+    states: Ints  # (P, c); of possible choices: a place for each robot that no other one holds
+    possible: Bools  # (C,) or (C, D); which choices these are, in the same order
 
     def rows(self, states: Ints) -> tuple[Ints, ...]:
         """Return where choices of states (n, c) stand in arrays of the shape of ``possible``."""
