@@ -347,18 +347,11 @@ RULES = ("newest", "payload", "ending", "placers", "candidates", *_COUNTS)
 """Names of rules in words."""
 
 
-def parse_rules(
-    given: FreeRules | str | Sequence[FreeRules | str],
-    robots: tuple[str, ...] = (),
-    where: str = "rules",
-) -> FreeRules:
-    """Parse rules from words, ``least_grips=1``, or return given ones, for robots by name.
-
-    ``where``: for messages.
-    """
+def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules:
+    """Parse rules from words, ``least_grips=1``, or return given ones."""
     several = given if isinstance(given, list | tuple) else (given,)
     if {*map(type, several)} - {str, FreeRules}:
-        raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
+        raise StepError(f"rules {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
     found, loosest = FreeRules(), {(name, said): value for name, value, said in _LOOSEST}
     for each in several:
         if not isinstance(each, str):
@@ -367,12 +360,12 @@ def parse_rules(
         name, _, text = each.partition("=")
         if name not in RULES:
             hint, known = did_you_mean(name, RULES), ", ".join(RULES)
-            raise StepError(f"{where} {each} does not exist{hint}; give one of {known}")
+            raise StepError(f"rules {each} does not exist{hint}; give one of {known}")
         value: object = int(text) if name in _COUNTS and text.isdecimal() else text
         if name == "placers":
             value = tuple(part.strip() for part in text.split(","))
         found = replace(found, **{name: loosest.get((name, text), value)})  # type: ignore[arg-type]
-    return replace(found, robots=robots) if robots else found
+    return found
 
 
 def with_robots(scene: Scene, count: int) -> Scene:

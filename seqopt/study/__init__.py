@@ -113,10 +113,10 @@ Examples
 _BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 
 
-def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Criterion:
+def find_criterion(criterion: Criterion | str) -> Criterion:
     """Return a criterion: itself, by name of `seqopt.CRITERIA`, or ranks, as ``T_max,M_sup=2``.
 
-    A weight is 1 by default; ``where``: for messages.
+    A weight is 1 by default.
     """
     if not isinstance(criterion, str):
         return criterion
@@ -129,9 +129,9 @@ def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Crit
             names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
             hint, known = did_you_mean(name, names), ", ".join(names)
             raise ProblemError(
-                f"{where} {name} does not exist{hint}; give one of {known}, F_ROBOT, or several"
+                f"criterion {name} does not exist{hint}; give one of {known}, F_ROBOT, or several"
             )
-        terms.append((name, number_word(weight or "1", f"{where} {part}")))
+        terms.append((name, number_word(weight or "1", f"criterion {part}")))
     return RankSum(criterion, tuple(terms), tuple(terms))
 
 

@@ -29,6 +29,7 @@ from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene import Scene
 
 optimize = Later("scipy.optimize")  # slow to import
+_EXACT = 1e-15  # of what is sought along a curve
 
 _Line = Callable[[float], Floats]
 """Takes a number from 0 at the first springing to 1 at the second; returns (x, z), m."""
@@ -55,7 +56,7 @@ def _circular(span: float, rise: float) -> _Line:
 def _catenary(span: float, rise: float) -> _Line:
     """Return a hanging chain turned upside down: the line of thrust of an even arch."""
     # with u = span / 2a: rise / span = (cosh u - 1) / 2u
-    slope = _root(lambda u: (math.cosh(u) - 1) / (2 * u) - rise / span, 1e-9, 100.0, 2e-12)
+    slope = optimize.brentq(lambda u: (math.cosh(u) - 1) / (2 * u) - rise / span, 1e-9, 100.0)
     scale, end = 0.5 * span / slope, math.sinh(slope)
 
     def line(at: float) -> Floats:
@@ -69,10 +70,6 @@ _CURVES = {"circular": _circular, "catenary": _catenary}
 """By name; each takes span and rise, m."""
 
 
-def _root(of: Callable[[float], float], low: float, high: float, tolerance: float = 1e-15) -> float:
-    return float(optimize.brentq(of, low, high, xtol=tolerance))
-
-
 def _chords(line: _Line, lengths: Floats) -> Floats | None:
     """Return the points (n + 1, 2) of a chain of links laid along a line; none if it is short."""
     at, points = 0.0, [line(0.0)]
@@ -80,7 +77,9 @@ def _chords(line: _Line, lengths: Floats) -> Floats | None:
         here = points[-1]
         if math.dist(line(1.0), here) < link:
             return None
-        at = _root(lambda s, here=here, link=link: math.dist(line(s), here) - link, at, 1.0)  # type: ignore[misc]
+        at = optimize.brentq(
+            lambda s, here=here, link=link: math.dist(line(s), here) - link, at, 1.0, xtol=_EXACT
+        )
         points.append(line(at))
     return np.array(points)
 
@@ -220,7 +219,7 @@ def _laid(form: ArchForm, count: int) -> tuple[float, Floats]:
             f"arch: joints between {count} bricks would be wider than {1e3 * widest:.3g} mm; give "
             f"more than {count}, or longer ones"
         )
-    gap = _root(left, 0.0, widest)
+    gap: float = optimize.brentq(left, 0.0, widest, xtol=_EXACT)
     points = _chords(line, lengths[:-1] + gap)
     if points is None:  # by rounding alone
         raise SceneError(f"arch: {count} bricks do not fill its curve; give another number")
