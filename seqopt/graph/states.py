@@ -644,7 +644,7 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
-    rules = rules.begun(engine.network.scene)
+    rules = rules.in_scene(engine.network.scene)
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)

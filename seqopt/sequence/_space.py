@@ -480,7 +480,7 @@ def free_space(
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
     space = _TakeDownSpace if rules.takes_down else FreeSpace
-    return space(network, rules.begun(scene), tuple(alike.values()), parks)
+    return space(network, rules.in_scene(scene), tuple(alike.values()), parks)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

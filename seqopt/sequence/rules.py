@@ -196,8 +196,8 @@ class FreeRules:
         """Return which moves from levels to levels, (m,), place a brick."""
         return np.asarray(after > before)
 
-    def begun(self, scene: Scene) -> FreeRules:
-        """Return the rules with the beginning of a take-down, by default without grips."""
+    def in_scene(self, scene: Scene) -> FreeRules:
+        """Return the rules in a scene: where a take-down begins, by default without grips."""
         if not self.takes_down or self.begin is not None:
             return self
         bare = Site(len(scene.placed), (None,) * len(scene.robots), step=0)
@@ -301,10 +301,6 @@ class FreeRules:
                 break
             count += 1
         return count
-
-    def in_scene(self, scene: Scene) -> FreeRules:
-        """Return the rules in another scene: unchanged, as they refer to none."""
-        return self
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
         """Yield the rules with one of them relaxed, and its command-line words."""
@@ -458,7 +454,7 @@ class _RuleBook:
     @property
     def start(self) -> tuple[int, Grips, int]:
         """Bricks, grips, and regrips since the last brick, at the beginning of the build."""
-        site = self.rules.begun(self.network.scene).begin
+        site = self.rules.in_scene(self.network.scene).begin
         if site is None:
             return 0, (None,) * len(self.network.scene.robots), 0
         return site.bricks, site.holds(self.network.scene), site.regrips

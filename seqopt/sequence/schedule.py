@@ -199,10 +199,6 @@ class Schedule(Shown):
             "regrips in a Pareto set, go with the free schedule"
         )
 
-    def begun(self, scene: Scene) -> Schedule:
-        """Return the schedule, which says itself where it begins."""
-        return self
-
     def keeps_payloads(self, *, stands: bool) -> bool:
         """Return whether robots hold no more than their payloads: where states must stand."""
         return stands
@@ -222,7 +218,7 @@ class Schedule(Shown):
 
     def in_scene(self, scene: Scene) -> Schedule:
         """Return the same steps of another scene with the same bricks, nodes and robots."""
-        return replace(self, scene=scene)
+        return self if scene is self.scene else replace(self, scene=scene)
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, Schedule]]:
         """Yield relaxations: given steps have none."""
