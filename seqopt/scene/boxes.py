@@ -199,13 +199,15 @@ def _find_overlaps(
         for k in (i, j):
             faces[k] = faces.get(k) or _faces(solids[k].points, solids[k])
         every = (*faces[i], *faces[j])
-        axes = np.array([face.axes[0] for face in every]).T
-        if min(_shared(*(_bounds_of(solid.points @ axes) for solid in pair))) <= deepest:
+        along = np.vstack([np.eye(3), [face.axes[0] for face in every]])
+        low, high = np.stack([_bounds_of(solid.points @ along.T) for solid in pair], axis=1)
+        over = high.min(axis=0) - low.max(axis=0)  # negative where they are apart
+        if over.min() <= deepest:
             continue
         starts = _where_both(pair, deepest)
         radius = max((_grown(pair, every, start) for start in starts), default=0.0)
         if 2 * radius > deepest:
-            x, y, z = _shared(bounds[i], bounds[j]).tolist()
+            x, y, z = over[:3].tolist()
             yield Overlap((i, j), 2 * radius, (x, y, z))
 
 
@@ -228,11 +230,6 @@ def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
         found = [(*each.pair, each.depth) for each in overlaps]
     found.sort(key=lambda held: -held[2])
     return [(bricks[i].name, bricks[j].name, depth) for i, j, depth in found]
-
-
-def _shared(some: Floats, others: Floats) -> Floats:
-    """Return by how much bounds (2, k) overlap (k,); negative where they are apart."""
-    return np.asarray(np.minimum(some[1], others[1]) - np.maximum(some[0], others[0]))
 
 
 def _faces(points: Floats, solid: Polyhedron) -> list[_Face]:
