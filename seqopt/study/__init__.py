@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import re
 from importlib import resources
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -275,18 +274,3 @@ def printed_maxima() -> pd.DataFrame:
     """
     table = printed("improvement_3robot").drop(columns=["quantity", "unit"])
     return table[[*PRINTED_COLUMN.values()]].set_axis([*PRINTED_COLUMN], axis=1)
-
-
-class Published(NamedTuple):
-    """What is printed about a scene: a plan, the largest responses, and what does not fit in it."""
-
-    steps: tuple[Step, ...]
-    maxima: pd.DataFrame
-    irregularities: tuple[str, ...]
-
-
-def published_about(scene: Scene) -> Published | None:
-    """Return what is printed about a scene; None of all but the arch of Bruun et al."""
-    if not is_reference_arch(scene):
-        return None
-    return Published(published_plan(scene), printed_maxima(), IRREGULARITIES)
