@@ -34,7 +34,7 @@ from seqopt.problem.requirements import (
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, find_postures
-from seqopt.sequence.part import Part, _Place, find_place, find_scene, find_schedule, without
+from seqopt.sequence.part import Part, _find_place, _Place, find_scene, find_schedule, without
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Site, StepKind
@@ -336,7 +336,7 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
         scene, begin = without(scene, begin, part.lost, [*map(int, part.missing)])
     if part.lost:
         robots = [robot.name for robot in scene.robots if robot.name not in part.lost]
-    end = find_place(part.to, "to", scene).site
+    end = _find_place(part.to, "to", scene).site
     find_postures(scene, search.cache, asked["progress"])
     own = make_engine(asked["engine"], build_network(scene), asked["mortar"])
     moves = _find_moves(own.network, part, robots, asked["candidates"], asked["rules"])

@@ -133,7 +133,7 @@ class Part:
 
     def find_begin(self, scene: Scene) -> _Place:
         """Return where it begins; changes need a build that goes on."""
-        begin = find_place(self.begin, "begin", scene)
+        begin = _find_place(self.begin, "begin", scene)
         if wrong := [name for name in self.missing if not str(name).isdecimal()]:
             raise StepError(f"missing {wrong[0]}: give the number of a brick")
         changes = (*(("lost", n) for n in self.lost), *(("missing", n) for n in self.missing))
@@ -143,7 +143,7 @@ class Part:
         return begin
 
 
-def find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
+def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
     """Return where a build begins or ends; ``name``: what of a part says it, for messages."""
     text = str(given)
     try:
