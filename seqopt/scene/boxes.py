@@ -20,7 +20,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import as_vector, as_vectors, short, units, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import Polyhedron, fans, normal_of, plane_axes, surround
+from seqopt.scene.shape import Polyhedron, _surround, fans, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
 
 optimize, spatial = Later("scipy.optimize"), Later("scipy.spatial")  # slow to import
@@ -263,7 +263,7 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
     found = []
     for mine, other in ((0, 1), (1, 0)):
         triangles = moved[other][fans(pair[other].faces)]
-        found.append(moved[mine][surround(triangles, moved[mine])])
+        found.append(moved[mine][_surround(triangles, moved[mine])])
         rims = [moved[mine][list(face)] for face in pair[mine].faces]
         start = np.vstack(rims)
         step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])

@@ -110,7 +110,7 @@ class Polyhedron:
 
     def contains(self, point: Floats) -> bool:
         """Return whether a point lies inside. ``point`` (3,)."""
-        return bool(surround(self.triangles, point[None])[0])
+        return bool(_surround(self.triangles, point[None])[0])
 
     def nodes(self) -> tuple[Vector, Vector]:
         """Return where its inner nodes lie if nobody says, from the centroid, m.
@@ -127,7 +127,7 @@ class Polyhedron:
         return (0.0 - x, 0.0 - y, 0.0 - z), (x, y, z)
 
 
-def surround(triangles: Floats, points: Floats) -> Bools:
+def _surround(triangles: Floats, points: Floats) -> Bools:
     """Return which points (k, 3) lie inside a solid: its triangles (T, 3, 3) surround them once."""
     a, b, c = np.moveaxis(triangles - points[:, None, None], 2, 0)
     lengths = [np.linalg.norm(side, axis=2) for side in (a, b, c)]

@@ -19,7 +19,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
-from seqopt.sequence.schedule import Move, OpenStep, near_nodes, near_rule
+from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -217,7 +217,7 @@ class FreeRules:
         """Return the nodes of the placed bricks that may be gripped."""
         nodes = scene.placed_nodes[: 2 * bricks]
         if self.candidates and nodes:
-            nodes = near_nodes(self.candidates, scene, bricks, nodes)
+            nodes = _near_nodes(self.candidates, scene, bricks, nodes)
         return frozenset(nodes)
 
     def team(self, scene: Scene) -> tuple[int, ...]:

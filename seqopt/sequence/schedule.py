@@ -46,7 +46,7 @@ def near_rule(rule: str) -> str:
     return text
 
 
-def near_nodes(rule: str, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
+def _near_nodes(rule: str, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
     """Select the nodes that are near at a brick count by a rule, or else the nearest ones."""
     placed = scene.build_order[:bricks]
     graph = nx.Graph(j.bricks for j in scene.joints if {*j.bricks} <= {*placed})
@@ -265,7 +265,7 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     """
     near, scene = near_rule(rule), schedule.scene
     moves = tuple(
-        replace(move, candidates=near_nodes(near, scene, move.bricks, move.candidates))
+        replace(move, candidates=_near_nodes(near, scene, move.bricks, move.candidates))
         for move in schedule.moves
     )
     kept, all_ = (sum(len(m.candidates) for m in some) for some in (moves, schedule.moves))
