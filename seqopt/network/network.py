@@ -1,8 +1,9 @@
-"""The double-cross network of section 3.2.1 of Bruun et al., its parts sorted by brick count.
+"""The double-cross network of section 3.2.1 of Bruun et al.: a graph, compiled to arrays once.
 
 Every brick has an inner edge. Every joint splits the connection of two bricks into half-edges that
 meet in a joint node, free stubs until the other brick is placed; a ground end adds a stub to a
-fixed base node. So the parts of a partial structure come first in every array.
+fixed base node. Parts are sorted by brick count: those of a partial structure come first in every
+array.
 """
 
 from __future__ import annotations
