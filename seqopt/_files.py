@@ -121,11 +121,6 @@ def read_table(
         raise error(f"{where}: not a readable CSV file: {wrong}") from wrong
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a UTF-8 file; else as `write_bytes`."""
-    write_bytes(path, text)
-
-
 def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int = 6) -> str:
     """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula.
 
@@ -150,8 +145,8 @@ def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int =
     return text.getvalue()
 
 
-def write_bytes(path: Path, content: bytes | str) -> None:
-    """Write a file atomically: it appears under its name only once complete.
+def write_file(path: Path, content: bytes | str) -> None:
+    """Write a file atomically, of bytes or UTF-8: it appears under its name only once complete.
 
     A link is followed to its target; an existing file keeps its mode. Raises `FileError` if it
     cannot be written, or the target is no regular file, as a device.
@@ -296,7 +291,7 @@ class Page:
 
     def save(self, path: str | Path) -> Path:
         """Write the page to a file. Raises `FileError` if it cannot be written."""
-        write_text(Path(path), self.text)
+        write_file(Path(path), self.text)
         return Path(path)
 
     def open(self, path: str | Path | None = None) -> Path:

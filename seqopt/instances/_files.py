@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
+from seqopt._files import parse_json, read_bytes, write_file, write_folder
 from seqopt._registry import Later
 from seqopt.arms._archives import Archive
 from seqopt.errors import FileError, ProblemError
@@ -279,4 +279,4 @@ def save_instance(instance: Instance, path: Path | str) -> None:
         raise FileError(
             f"{path}: {path.suffix} is no format of instances; give {known}, or a folder"
         )
-    write_bytes(path, WRITERS[path.suffix](instance))
+    write_file(path, WRITERS[path.suffix](instance))

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import parse_json, read_text, write_text
+from seqopt._files import parse_json, read_text, write_file
 from seqopt._registry import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
@@ -333,4 +333,4 @@ def save_scene(scene: Scene, path: Path) -> None:
     True
     """
     folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
-    write_text(path, dump_scene(scene, folder))
+    write_file(path, dump_scene(scene, folder))
