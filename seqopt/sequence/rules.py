@@ -250,8 +250,9 @@ class FreeRules:
 
     def fewest_grips(self, scene: Scene) -> int:
         """Return the least number of grips, from the second brick on."""
-        usual = _usual_grips(len(self.team(scene)))
-        return usual if self.least_grips is None else self.least_grips
+        if self.least_grips is not None:
+            return self.least_grips
+        return _usual_grips(len(self.team(scene)))
 
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON. Result: by name."""
