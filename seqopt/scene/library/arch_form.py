@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
@@ -122,7 +122,7 @@ class ArchForm:
         check(self, "arch", bricks=partial(whole_between, least=2), pattern=letters)
         check(self, "arch", dimensions=sizes, gap=_joint_width, density=density, law=a_law)
 
-    @cached_property
+    @property
     def line(self) -> _Line:
         """The curve."""
         return _CURVES[self.curve](self.span, self.rise)
@@ -179,7 +179,8 @@ def _first_that_fits(form: ArchForm, make: Callable[[int], Scene]) -> Scene:
     """
     counts = [form.bricks] if form.bricks else []
     if not counts:
-        points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
+        line = form.line
+        points = np.array([line(at) for at in np.linspace(0, 1, 2001)])
         way = float(np.hypot(*np.diff(points, axis=0).T).sum())
         most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
         _few_enough("arch", most // 2)
