@@ -1,4 +1,4 @@
-from seqopt._registry import Command as Command
+from seqopt._cli.registry import Command as Command
 from seqopt.arms._permits import reach as reach
 from seqopt.contact.mortar import DRY as DRY
 from seqopt.contact.mortar import EPOXY as EPOXY
@@ -11,8 +11,8 @@ from seqopt.instances._files import read_instance as read_instance
 from seqopt.instances._files import save_instance as save_instance
 from seqopt.instances.answers import judge_instance as judge_instance
 from seqopt.instances.compiled import compile_instance as compile_instance
-from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
+from seqopt.network.network import build_network as build_network
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solve import pose as pose
@@ -25,6 +25,7 @@ from seqopt.questions import assess as assess
 from seqopt.questions import pareto as pareto
 from seqopt.questions import replan as replan
 from seqopt.report._questions import compare as compare
+from seqopt.report.sweep import sweep as sweep
 from seqopt.scene.arch import ArchShape as ArchShape
 from seqopt.scene.arch import arch_scene as arch_scene
 from seqopt.scene.parts import Prop as Prop

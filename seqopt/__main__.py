@@ -21,9 +21,8 @@ AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 def run() -> int:
     """Run the shell's command and return its exit status, also if interrupted while loading."""
     try:
-        _open_streams()
+        _prepare()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
-        _require_room()
         from seqopt._cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
         from seqopt.work.progress import interrupt_main  # noqa: PLC0415
 
@@ -87,18 +86,11 @@ def _leave(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 
-def _require_room() -> None:
-    """Raise a `MemoryError` for a memory limit under which libraries hang."""
-    if os.name == "posix":
-        import resource  # noqa: PLC0415  # POSIX has it alone
+def _prepare() -> None:
+    """Occupy the descriptors of closed streams; escape characters that a stream cannot encode.
 
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY and limit < LEAST:
-            raise MemoryError(f"{limit / 1e6:.0f} MB may be used, and it takes {LEAST / 1e6:.0f}")
-
-
-def _open_streams() -> None:
-    """Occupy the descriptors of closed streams; escape characters that a stream cannot encode."""
+    Raises a `MemoryError` for a memory limit under which libraries hang.
+    """
     for place in range(3):
         try:
             os.fstat(place)
@@ -107,6 +99,12 @@ def _open_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    if os.name == "posix":
+        import resource  # noqa: PLC0415  # POSIX has it alone
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY and limit < LEAST:
+            raise MemoryError(f"{limit / 1e6:.0f} MB may be used, and it takes {LEAST / 1e6:.0f}")
 
 
 if __name__ == "__main__":

@@ -121,11 +121,6 @@ def read_table(
         raise error(f"{where}: not a readable CSV file: {wrong}") from wrong
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a UTF-8 file; else as `write_bytes`."""
-    write_bytes(path, text)
-
-
 def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int = 6) -> str:
     """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula.
 
@@ -150,8 +145,8 @@ def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int =
     return text.getvalue()
 
 
-def write_bytes(path: Path, content: bytes | str) -> None:
-    """Write a file atomically: it appears under its name only once complete.
+def write_file(path: Path, content: bytes | str) -> None:
+    """Write a file atomically, of bytes or UTF-8: it appears under its name only once complete.
 
     A link is followed to its target; an existing file keeps its mode. Raises `FileError` if it
     cannot be written, or the target is no regular file, as a device.
@@ -181,13 +176,16 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
 
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
     """Raise a `FileError` if two outputs are the same file, or one is an input."""
-    seen: list[Path] = []
-    for path in outputs:
-        if any(_is_same(path, other) for other in inputs):
-            raise FileError(f"cannot write {path}: it is the input; name another file")
-        if any(_is_same(path, other) for other in seen):
-            raise FileError(f"cannot write {path}: two outputs go there; name another file")
-        seen.append(path)
+    for i, path in enumerate(outputs):
+        others = [(each, "it is the input") for each in inputs]
+        others += [(each, "two outputs go there") for each in outputs[:i]]
+        for other, why in others:
+            try:
+                same = path.samefile(other)
+            except OSError:  # one of them is not there
+                same = os.path.realpath(path) == os.path.realpath(other)
+            if same:
+                raise FileError(f"cannot write {path}: {why}; name another file")
 
 
 def require_folder(path: Path) -> None:
@@ -263,14 +261,6 @@ def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
             hidden.unlink(missing_ok=True)
 
 
-def _is_same(path: Path, other: Path) -> bool:
-    """Return whether two paths lead to the same file, which may not exist."""
-    try:
-        return path.samefile(other)
-    except OSError:  # one of them is not there
-        return os.path.realpath(path) == os.path.realpath(other)
-
-
 PAGE = "report.html"  # the page in a folder that a command writes
 
 
@@ -301,7 +291,7 @@ class Page:
 
     def save(self, path: str | Path) -> Path:
         """Write the page to a file. Raises `FileError` if it cannot be written."""
-        write_text(Path(path), self.text)
+        write_file(Path(path), self.text)
         return Path(path)
 
     def open(self, path: str | Path | None = None) -> Path:

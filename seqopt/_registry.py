@@ -3,7 +3,7 @@
 Pictures of values are among them: `seqopt.report` draws, and imports scenes and plans. Modules and
 names of a package may wait in the same way; milliseconds beside a `Later` are what others save.
 
-A room with another amount, filter or command adds a line here. The core works without any
+A room with another amount or filter adds a line here. The core works without any
 of them. Plug-ins add amounts, filters, formats and commands by entry points of the group
 ``seqopt.parts``, users by `seqopt.register`.
 """
@@ -13,10 +13,9 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Container, Mapping
-from dataclasses import dataclass, field
 from importlib import import_module
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from seqopt.errors import ExtraError, PluginWarning, message_of, plugins
 
@@ -96,95 +95,20 @@ class Part:
     """Base of parts that packages and users register by name: formats, commands."""
 
     name: str
-
-    def reserved(self) -> Container[str]:
-        """Return names that are always there."""
-        raise NotImplementedError
+    built_in: ClassVar[Container[str]]  # names of the parts that are always there
 
 
-@dataclass(frozen=True, repr=False)
-class Command(Part):
-    """A command of the command line: a function, whose parameters are its options.
-
-    Parameters
-    ----------
-    name : str
-        The word for it.
-    function : callable or str
-        Its docstring is the help, its annotations and defaults say how options are read. It returns
-        a text or a table. ``"module:function"`` is loaded on demand.
-    about : str, optional
-        A line in the list of all commands; by default the first line of the docstring.
-
-    Examples
-    --------
-    >>> Command("weigh", lambda scene="arch25": f"{scene} weighs a lot")
-    Command('weigh')
-    """
-
-    name: str
-    function: Callable[..., Any] | str = field(compare=False)
-    about: str = field(default="", compare=False)
-
-    def __repr__(self) -> str:
-        return f"Command({self.name!r})"
-
-    def reserved(self) -> Container[str]:
-        """Return the names of the commands that are always there."""
-        return COMMANDS
-
-    @property
-    def line(self) -> str:
-        """What it is for, in a line."""
-        return self.about or (self.load().__doc__ or "").strip().partition("\n")[0]
-
-    def load(self) -> Callable[..., Any]:
-        """Return the function."""
-        if callable(self.function):
-            return self.function
-        home, name = self.function.split(":")
-        found: Callable[..., Any] = getattr(import_module(home), name)
-        return found
-
-
-COMMANDS = {
-    name: Command(name, f"seqopt._cli.commands.{home}:run", about)
-    for name, home, about in (
-        ("compare", "compare", "show all ways to build a scene side by side"),
-        ("optimize", "optimize", "choose where robots hold, and write the plan"),
-        ("replan", "replan", "plan the rest of a build after a change"),
-        ("pareto", "pareto", "find all plans that no other one beats in every aim"),
-        ("sweep", "sweep", "plan many problems, a row of a table for each"),
-        ("analyze", "analyze", "compute forces and displacements in every step"),
-        ("times", "times", "say how long a build takes, and who does what when"),
-        ("assess", "assess", "prove which steps stand, and with what margins"),
-        ("report", "report", "make a page that shows plans step by step"),
-        ("reach", "reach", "say which arms reach which nodes, and how"),
-        ("scene", "scene", "check, describe, export or list scenes"),
-        ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
-        ("export", "exporting", "write a plan in a format of others"),
-        ("instance", "instance", "write the graph of a problem, for any solver"),
-        ("judge", "judge", "check a bare solution of an instance, and a bound"),
-    )
-}
-"""The commands that are always there, by name."""
-
-
-def every_command() -> dict[str, Command]:
-    """Return all commands by name: those that are always there, and those that are registered."""
-    return {**COMMANDS, **registered(Command)}
-
-
-def find_command(name: str) -> Command:
-    """Return a command by name; those of plug-ins are only looked for if there is no other."""
-    return COMMANDS.get(name) or registered(Command)[name]
+def load(place: str) -> Any:
+    """Return what ``"module:name"`` names, for those who know it only as a word."""
+    home, name = place.split(":")
+    return getattr(import_module(home), name)
 
 
 def offered(name: str) -> Any:
     """Return the offer of an outer room by name; None if there is none, or the room is missing."""
     home = OFFERS.get(name, "")
     try:
-        return getattr(import_module(home), name) if home else None
+        return load(f"{home}:{name}") if home else None
     except ModuleNotFoundError as error:
         if error.name != ".".join(home.split(".")[:2]):
             raise
@@ -194,9 +118,8 @@ def offered(name: str) -> Any:
 def display(kind: type, way: str) -> Callable[..., Any]:
     """Return the renderer of a class of values, as ``plot``, loaded on first use."""
     keys = (f"{each.__name__}.{way}" for each in kind.__mro__)
-    home, name = next(VIEWS[key] for key in keys if key in VIEWS).split(":")
     try:
-        found: Callable[..., Any] = getattr(import_module(home), name)
+        found: Callable[..., Any] = load(next(VIEWS[key] for key in keys if key in VIEWS))
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] != "matplotlib":
             raise

@@ -118,16 +118,13 @@ def _same(first: object, second: object) -> bool:
             first, second, equal_nan=first.dtype.kind == "f"
         )
     if isinstance(first, _COMPRESSED) and isinstance(second, _COMPRESSED):
-        return first.format == second.format and _same(_stored(first), _stored(second))
+        names = ("format", "shape", "data", "indices", "indptr")
+        return all(_same(getattr(first, name), getattr(second, name)) for name in names)
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         return first.keys() == second.keys() and all(_same(first[k], second[k]) for k in first)
     if isinstance(first, list | tuple) and type(first) is type(second):
         return len(first) == len(second) and all(map(_same, first, second))
     return bool(first == second) or (_is_nan(first) and _is_nan(second))
-
-
-def _stored(matrix: sparse.csr_array | sparse.csc_array) -> tuple[object, ...]:
-    return matrix.shape, matrix.data, matrix.indices, matrix.indptr
 
 
 def _is_nan(content: object) -> bool:

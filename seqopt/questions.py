@@ -24,8 +24,7 @@ from seqopt.errors import (
     StepError,
     did_you_mean,
 )
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.plan.build import GivenSequence, ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import graph_of

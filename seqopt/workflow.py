@@ -16,8 +16,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.formulation import Formulation, Run, as_formulation, find_formulation
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import _solve_run, default_formulation, pose
 from seqopt.problem.amounts import parse_goals
@@ -35,7 +34,7 @@ from seqopt.problem.requirements import (
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, find_postures
-from seqopt.sequence.part import Part, _Place, find_scene, find_schedule
+from seqopt.sequence.part import Part, _find_place, _Place, find_scene, find_schedule, without
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Site, StepKind
@@ -122,22 +121,19 @@ class Search:
 
     @property
     def memory(self) -> float | None:
-        """The memory that it may take, bytes."""
-        return _parse_size(self.max_memory) if isinstance(self.max_memory, str) else self.max_memory
+        """The memory that it may take, bytes; sizes are as ``2GB``, ``500 MB`` or ``1.5GiB``.
 
-
-def _parse_size(text: str) -> float:
-    """Parse a size, as ``2GB``, ``500 MB`` or ``1.5GiB``, into bytes.
-
-    >>> _parse_size("1.5GB")
-    1500000000.0
-    """
-    found = SIZE.fullmatch(text.strip())
-    if found is None or not 0 < float(found[1]) < LARGEST:
-        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
-    unit = found[2].upper()
-    power = "BKMGT".find(unit[:1] or "B")
-    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
+        >>> Search(max_memory="1.5GB").memory
+        1500000000.0
+        """
+        if not isinstance(text := self.max_memory, str):
+            return text
+        found = SIZE.fullmatch(text.strip())
+        if found is None or not 0 < float(found[1]) < LARGEST:
+            raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
+        unit = found[2].upper()
+        power = "BKMGT".find(unit[:1] or "B")
+        return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
 def parse_numbers(
@@ -335,10 +331,12 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     robots = None if isinstance(robots, int) else robots
     if part.direction == Direction.TAKE_DOWN.value and not free:
         raise ProblemError(f"direction {part.direction}: it goes with schedule={FREE!r}")
-    scene, begin = part.change(scene, _with_ages(scene, part.find_begin(scene), stands))
+    begin = _with_ages(scene, part.find_begin(scene), stands)
+    if begin is not None and (part.lost or part.missing):
+        scene, begin = without(scene, begin, part.lost, [*map(int, part.missing)])
     if part.lost:
         robots = [robot.name for robot in scene.robots if robot.name not in part.lost]
-    end = part.find_end(scene)
+    end = _find_place(part.to, "to", scene).site
     find_postures(scene, search.cache, asked["progress"])
     own = make_engine(asked["engine"], build_network(scene), asked["mortar"])
     moves = _find_moves(own.network, part, robots, asked["candidates"], asked["rules"])

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import bare_assembly
 from seqopt.exchange.contacts import flat_face
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene._checks import as_vectors
 from seqopt.scene.boxes import block_brick, vertices_of
 from seqopt.scene.parts import Ground, Joint

@@ -8,7 +8,7 @@ import numpy as np
 
 from seqopt.engines.interface import _NAMES, Fields, Want
 from seqopt.engines.rigid.compliance import ACCURACY, _FastSolution
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side

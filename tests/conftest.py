@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from seqopt._registry import ADDED
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.solve import pose
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import three_robot_loop

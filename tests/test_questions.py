@@ -10,8 +10,8 @@ import pytest
 
 import seqopt
 from seqopt._cli.main import main
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.signatures import signature_of
-from seqopt._registry import COMMANDS
 from seqopt.instances import instance
 from seqopt.plan.plan import Plan
 from seqopt.questions import find_build

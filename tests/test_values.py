@@ -10,7 +10,7 @@ from scipy import sparse
 
 import seqopt
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import face_quadrature, find_elastic_limits
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete.engine import _build_system, _held_nodes, _settle

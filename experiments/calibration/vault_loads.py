@@ -28,8 +28,8 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.scenes import barrel_vault
 from seqopt import DRY, Scene
 from seqopt.arrays import Floats
-from seqopt.contact.faces import step_assembly
-from seqopt.network.build import build_network
+from seqopt.contact.assembly import step_assembly
+from seqopt.network.network import build_network
 from seqopt.scene import Load
 from seqopt.stability.assessment import load_factor
 from seqopt.study import printed

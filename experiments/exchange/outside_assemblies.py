@@ -43,7 +43,7 @@ from experiments.harness.scenes import read_folder
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt import EPOXY, Scene, Step, build_network, load_scene
 from seqopt._cli.main import main
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.errors import SceneWarning
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import sniffed, writable

@@ -24,7 +24,7 @@ from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25, longer, method_steps
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt import Network, Scene, Step, build_network, pose, solve
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.network import GROUND

@@ -15,8 +15,9 @@ from importlib.metadata import version
 from typing import Any, NoReturn
 
 from seqopt._cli.answer import Answer, Status, answer_of
+from seqopt._cli.registry import COMMANDS, every_command, find_command
 from seqopt._cli.terminal import columns, complain, show
-from seqopt._registry import COMMANDS, Later, every_command, find_command
+from seqopt._registry import Later
 from seqopt.errors import did_you_mean
 
 EXAMPLES = """Three examples:

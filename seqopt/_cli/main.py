@@ -11,8 +11,9 @@ from importlib import import_module
 
 from seqopt._cli.answer import Status, print_answer, status_of
 from seqopt._cli.arguments import EXAMPLES, Request, named_command, parser, request
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.terminal import flush, quiet_numbers, show, silence
-from seqopt._registry import COMMANDS, Later
+from seqopt._registry import Later
 from seqopt.errors import SeqoptError
 
 WATCHER = Later("seqopt._cli.watcher")  # 60 ms: it needs NumPy

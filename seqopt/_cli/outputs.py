@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._files import PAGE, csv_text, require_apart, require_folder, write_folder, write_text
+from seqopt._files import PAGE, csv_text, require_apart, require_folder, write_file, write_folder
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE
@@ -23,7 +23,7 @@ def put_table(
     """Write a table, and return the entries of its answer; without a file the table is the text."""
     if path is None:
         return {"data": csv_text(table)}
-    write_text(path, csv_text(table))
+    write_file(path, csv_text(table))
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 

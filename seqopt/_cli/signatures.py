@@ -19,9 +19,9 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import FLAGS, HIDDEN, HOW, MOST_WORKERS, QUESTIONS, SPREAD, VALUES
-from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
 from seqopt.problem.requirements import number_word
 

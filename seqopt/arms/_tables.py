@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._archives import Archive
-from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt._files import make_folder, read_bytes, write_file
+from seqopt.arms._archives import Archive
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import UP, ArmModel, arm_model
 from seqopt.arms._postures import PostureTable, choose
@@ -127,7 +127,7 @@ def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable])
     out = io.BytesIO()
     arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
     np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
-    write_bytes(path, out.getvalue())
+    write_file(path, out.getvalue())
     return table
 
 

@@ -20,8 +20,7 @@ Joints stay elastic as long as the stress on their faces is less than the streng
 [True, False]
 """
 
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 
 __all__ = ["DRY", "EPOXY", "Assembly", "Mortar", "step_assembly"]

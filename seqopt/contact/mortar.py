@@ -16,8 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import Assembly, bare_assembly
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import Network

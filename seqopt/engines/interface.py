@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
-from seqopt.network.build import network_of
-from seqopt.network.network import Network
+from seqopt.network.network import Network, network_of
 from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
 
@@ -93,7 +92,7 @@ class Engine(Protocol):
     Examples
     --------
     >>> from seqopt.engines.registry import make_engine
-    >>> from seqopt.network.build import build_network
+    >>> from seqopt.network.network import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> engine: Engine = make_engine("compliance", build_network(load_scene("arch25")))
     >>> fields = engine.solve(2, [[2], [3]], Want.SUPPORT)  # two bricks, node 2 or 3 held

@@ -29,8 +29,7 @@ from seqopt.engines.interface import (
 )
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
-from seqopt.network.build import build_network, network_of
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network, network_of
 from seqopt.scene.arm import from_arms
 from seqopt.scene.scene import Scene
 
@@ -200,7 +199,7 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
 
     Examples
     --------
-    >>> from seqopt.network.build import build_network
+    >>> from seqopt.network.network import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> engine = make_engine("compliance", build_network(load_scene("arch25")))
     >>> engine.solve(1, [[1]]).grip_force.shape

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from heapq import heapify, heappop, heappush
 from itertools import islice
 
 import numpy as np
@@ -17,7 +18,7 @@ from seqopt.exchange._meshes import Repaired, repair_shape
 from seqopt.exchange.contacts import _find_contacts, _Held, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import _find_overlaps, block_brick
-from seqopt.scene.library.common import MASONRY, JointLaw, _mobile_robots, _touching_order, a_law
+from seqopt.scene.library.common import MASONRY, JointLaw, _mobile_robots, a_law
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
@@ -254,3 +255,28 @@ def _interpenetrating(
             "apart, or accept it (--accept-overlaps)"
         )
     return {i for pair, _ in overlaps for i in pair}, [f"{line}, as accepted" for line in lines]
+
+
+def _touching_order(
+    rank: Sequence[float | tuple[float, ...]],
+    pairs: Iterable[tuple[int, int]],
+    starts: Iterable[int],
+) -> list[int]:
+    """Return an order in which every brick touches an earlier one, or the ground.
+
+    Of what can be placed, the lowest ``rank`` is next; what cannot be reached is left out.
+    """
+    beside: list[set[int]] = [set() for _ in rank]
+    for a, b in pairs:
+        beside[a].add(b)
+        beside[b].add(a)
+    seen, order = {*starts}, list[int]()
+    ready = [(rank[i], i) for i in seen]
+    heapify(ready)
+    while ready:
+        i = heappop(ready)[1]
+        order.append(i)
+        for j in beside[i] - seen:
+            seen.add(j)
+            heappush(ready, (rank[j], j))
+    return order

@@ -83,10 +83,6 @@ class Format(Part):
     def __repr__(self) -> str:
         return f"Format({self.name!r})"
 
-    def reserved(self) -> Sequence[str]:
-        """Return the names of the formats that are always there."""
-        return [*BUILT_IN]
-
 
 def _document(form: str | None, path: Path) -> Content:
     """Return the content of a JSON document, by default of the format that it looks like."""
@@ -148,6 +144,7 @@ BUILT_IN = {
         ),
     )
 }
+Format.built_in = BUILT_IN
 
 
 def formats() -> dict[str, Format]:

@@ -17,8 +17,7 @@ from seqopt.engines.registry import engine_for, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._candidates import CandidateCosts
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.problem.amounts import (
     LARGEST,
     NONE,
@@ -645,7 +644,7 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
-    rules = rules.begun(engine.network.scene)
+    rules = rules.in_scene(engine.network.scene)
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)

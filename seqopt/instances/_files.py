@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._archives import Archive
-from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
+from seqopt._files import parse_json, read_bytes, write_file, write_folder
 from seqopt._registry import Later
+from seqopt.arms._archives import Archive
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, _Target
 from seqopt.instances._program import as_mps
@@ -279,4 +279,4 @@ def save_instance(instance: Instance, path: Path | str) -> None:
         raise FileError(
             f"{path}: {path.suffix} is no format of instances; give {known}, or a folder"
         )
-    write_bytes(path, WRITERS[path.suffix](instance))
+    write_file(path, WRITERS[path.suffix](instance))

@@ -46,7 +46,7 @@ from seqopt.judge.arithmetic import (
     limit_below,
 )
 from seqopt.judge.certificate import _twin_of
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, in_order

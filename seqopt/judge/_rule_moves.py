@@ -171,7 +171,7 @@ class RuleTables(_Tables):
     ) -> None:
         scene = book.network.scene
         super().__init__(scene, book.team, groups, parks=parks)
-        self._book, self._rules = book, book.rules.begun(scene)
+        self._book, self._rules = book, book.rules.in_scene(scene)
         self.first, self.last = book.span
         self._top = 0  # of a take-down: one more than the bricks at its begin, which is level 1
         if self._rules.takes_down:
@@ -459,7 +459,7 @@ def check_free(
     """Require that a checked sequence keeps the rules of a free schedule; forces are not asked."""
     tables, heavy = RuleTables(_RuleBook(network, rules, worlds), []), dict[int, str]()
     if rules.payload is Payload.KEPT:
-        heavy = _unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
+        heavy = _unbearable((network.scene, *worlds), steps, rules.in_scene(network.scene).begin)
     level, state = tables.first, tables.start()
     for step in steps:
         if step.number in heavy:

@@ -12,7 +12,6 @@ The parts of a partial structure come first in every array, so its brick count i
 (11, 10, array([0, 1, 2]))
 """
 
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 
 __all__ = ["Network", "build_network"]

@@ -1,28 +1,32 @@
-"""The double-cross network of section 3.2.1 of Bruun et al., its parts sorted by brick count.
+"""The double-cross network of section 3.2.1 of Bruun et al.: a graph, compiled to arrays once.
 
 Every brick has an inner edge. Every joint splits the connection of two bricks into half-edges that
 meet in a joint node, free stubs until the other brick is placed; a ground end adds a stub to a
-fixed base node. So the parts of a partial structure come first in every array.
+fixed base node. Parts are sorted by brick count: those of a partial structure come first in every
+array.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
+import math
+from collections import Counter
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
+import networkx as nx
 import numpy as np
 
 from seqopt._registry import Shown, display
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
-from seqopt.scene._checks import units
-from seqopt.scene.scene import Scene
+from seqopt.scene._checks import frames, units
+from seqopt.scene.parts import Ground, Joint
+from seqopt.scene.scene import Scene, in_order
 
 if TYPE_CHECKING:
-    import networkx as nx
     from matplotlib.figure import Figure
 
 DoubleCross: TypeAlias = "nx.DiGraph[Any]"
@@ -30,6 +34,7 @@ DoubleCross: TypeAlias = "nx.DiGraph[Any]"
 _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
 
+_EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 GROUND = -1  # stands for the ground where a brick's index in build order is expected
 
 
@@ -148,7 +153,7 @@ class Network(Shown, FrozenValue):
 
     Examples
     --------
-    >>> from seqopt.network.build import build_network
+    >>> from seqopt.network.network import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> network = build_network(load_scene("arch25"))
     >>> network
@@ -173,6 +178,8 @@ class Network(Shown, FrozenValue):
     edge_brick: Ints
     edge_spring: Ints
     weight: Floats
+    derived: dict[str, Any] = field(default_factory=dict, init=False, compare=False)
+    """Values that outer rooms derive from the network alone and cache with it, by name."""
 
     def __repr__(self) -> str:
         bricks = f"{len(self.inner)} bricks, {len(self.springs.since)} springs"
@@ -268,11 +275,6 @@ class Network(Shown, FrozenValue):
         return frozen(units(step))
 
     @cached_property
-    def derived(self) -> dict[str, Any]:
-        """Values that outer rooms derive from the network alone and cache with it, by name."""
-        return {}
-
-    @cached_property
     def lever(self) -> float:
         """The length of the longest inner edge, which scales moments, m."""
         ends = self.node_position[self.inner]
@@ -323,3 +325,146 @@ class Network(Shown, FrozenValue):
         """Draw the network, or its part of the first ``bricks``, in build order."""
         figure: Figure = display(Network, "plot")(self, bricks)
         return figure
+
+
+_Springs = list[tuple[Joint | Ground, int]]  # with the brick counts from which they act
+
+
+def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Network:
+    """Return the network of a whole scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    order : sequence of int or str, optional
+        The order in which bricks are placed, in a form that `seqopt.scene.scene.in_order`
+        accepts; by default the scene's own.
+
+    Returns
+    -------
+    Network
+        The network; its scene has this order.
+
+    Raises
+    ------
+    SceneError
+        If the argument is not a scene, or the order does not name every brick once.
+
+    Examples
+    --------
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> build_network(load_scene("arch25"))
+    <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
+    """
+    if not isinstance(scene, Scene):
+        kind = type(scene).__name__
+        raise SceneError(f"a {kind} is not a scene; give one, as load_scene('arch25') returns it")
+    scene = in_order(scene, order)
+    every: list[Joint | Ground] = [*scene.grounds, *scene.joints]
+    closing = [getattr(spring, "closes_with", None) for spring in every]
+    counts = [
+        max(scene.since[b] for b in (*spring.ends, last) if b is not None)
+        for spring, last in zip(every, closing, strict=True)
+    ]
+    ascending = np.argsort(counts, kind="stable")
+    springs = [(every[i], counts[i]) for i in ascending]
+    support = np.argsort(ascending)[: len(scene.grounds)]
+    return _compile(scene, _double_cross(scene, springs), springs, support)
+
+
+def network_of(given: Network | Scene) -> Network:
+    """Return a network unchanged, or the network of a scene."""
+    if isinstance(given, Network | Scene):
+        return given if isinstance(given, Network) else build_network(given)
+    kind = type(given).__name__
+    raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
+
+
+def _double_cross(scene: Scene, springs: _Springs) -> DoubleCross:
+    """Return the graph of a scene: every brick, then every spring with what it brings."""
+    graph: DoubleCross = nx.DiGraph(name=scene.name)
+    for i, brick in enumerate(scene.placed):
+        own = _PartData(kind=PartKind.INNER, since=i + 1, spring=-1, brick=i)
+        for number in brick.nodes:
+            graph.add_node(number, **_NodeData(**own, position=brick.node_position(number)))
+        graph.add_edge(*brick.nodes, **own)
+    alike = Counter[tuple[object, ...]]()  # springs that join the same bodies are counted
+    for s, (spring, since) in enumerate(springs):
+        joined = spring.bricks if isinstance(spring, Joint) else ("ground", spring.brick)
+        alike[joined] += 1
+        name = ("joint", *joined, *([alike[joined]] if alike[joined] > 1 else []))
+        ends, at = [scene.since[b] for b in spring.ends], spring.position
+        own = _PartData(kind=PartKind.JOINT, since=min(ends), spring=s, brick=-1)
+        graph.add_node(name, **_NodeData(**own, position=at))
+        for count in ends:  # each brick meets it through its nearer node, or the first
+            brick = scene.placed[count - 1]
+            first, second = (math.dist(brick.node_position(node), at) for node in brick.nodes)
+            met = brick.nodes[int(first > second * (1 + _EQUALLY_FAR))]
+            graph.add_edge(met, name, **{**own, "since": count, "brick": count - 1})
+        if isinstance(spring, Ground):
+            base = ("base", *name[1:])
+            own = _PartData(kind=PartKind.BASE, since=since, spring=s, brick=-1)
+            graph.add_node(base, **_NodeData(**own, position=spring.anchor))
+            graph.add_edge(name, base, **own)
+    nx.freeze(graph)
+    return graph
+
+
+def _compile(scene: Scene, graph: DoubleCross, springs: _Springs, support: Ints) -> Network:
+    """Compile a double cross to arrays; the order in which its parts were added does not matter."""
+    last = {end for _, end, data in graph.edges.data() if data["kind"] is PartKind.INNER}
+
+    def appears(part: tuple[Any, ...]) -> tuple[int, int, int, bool]:
+        data: _PartData = part[-1]
+        return data["since"], data["spring"], data["kind"], part[0] in last
+
+    nodes: list[Any] = sorted(graph.nodes.data(), key=appears)
+    edges: list[Any] = sorted(graph.edges.data(), key=appears)
+    index = {name: i for i, (name, _) in enumerate(nodes)}
+    arrays = {
+        f"{what}_{key}": np.array([int(part[-1][key]) for part in parts])
+        for what, parts in (("node", nodes), ("edge", edges))
+        for key in _PartData.__annotations__
+    }
+    joint = np.flatnonzero(arrays["node_kind"] == PartKind.JOINT.value)
+    ends = np.array([[index[name] for name in edge[:2]] for edge in edges])
+    mass = np.array([brick.mass for brick in scene.placed])[:, None]
+    return Network(
+        scene=scene,
+        graph=graph,
+        springs=_springs(scene, springs, support, joint[np.argsort(arrays["node_spring"][joint])]),
+        node_position=np.array([data["position"] for _, data in nodes]),
+        node_name=tuple(index),
+        inner=ends[arrays["edge_kind"] == PartKind.INNER.value],
+        edge_nodes=ends,
+        weight=mass * (scene.weight_factor * np.array(scene.gravity)),
+        **arrays,
+    )
+
+
+def _springs(scene: Scene, springs: _Springs, support: Ints, node: Ints) -> Springs:
+    """Return springs as arrays; with a face, the first axis points into the second body."""
+    each = [spring for spring, _ in springs]
+    place = [[scene.since[name] - 1 for name in spring.ends] for spring in each]
+    turned = [
+        s.face is not None and ends[0] > ends[-1] for s, ends in zip(each, place, strict=True)
+    ]
+    along = np.array([spring.along for spring in each]) * np.where(turned, -1.0, 1.0)[:, None]
+    movement = np.array([getattr(spring, "movement", None) or np.zeros(6) for spring in each])
+    position = np.array([spring.position for spring in each])
+    anchor = np.array([getattr(spring, "anchor", spring.position) for spring in each])
+    movement[:, :3] += np.cross(movement[:, 3:], position - anchor)  # where the spring is
+    return Springs(
+        bodies=np.array([sorted([GROUND, *ends][-2:]) for ends in place]),  # the lower one first
+        since=np.array([since for _, since in springs]),
+        node=node,
+        position=position,
+        anchor=anchor,
+        axes=frames(along, np.array([spring.across for spring in each])),
+        translational_stiffness=np.array([spring.translational_stiffness for spring in each]),
+        rotational_stiffness=np.array([spring.rotational_stiffness for spring in each]),
+        support=support,
+        movement=movement,
+        thickness=np.array([spring.thickness for spring in each], dtype=float),  # None is NaN
+        face=tuple(np.array(s.corners or (), dtype=float).reshape(-1, 3) for s in each),
+    )

@@ -39,7 +39,7 @@ from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.sequence.rules import FREE, _RuleBook
 from seqopt.sequence.rules import _unbearable as too_heavy_steps
-from seqopt.sequence.schedule import OpenStep, loads
+from seqopt.sequence.schedule import loads
 from seqopt.stability.standing import Standing
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
@@ -244,8 +244,8 @@ def _where(problem: States, reached: int) -> str:
 
 def _unbearable(problem: States) -> dict[int, str]:
     """Return the steps in which a robot cannot bear its brick, and why; of rules there are none."""
-    steps: Sequence[OpenStep] = getattr(problem.rules, "steps", ())
-    return too_heavy_steps((problem.network.scene, *problem.worlds), steps, problem.rules.begin)
+    rules = problem.rules
+    return too_heavy_steps((problem.network.scene, *problem.worlds), rules.steps, rules.begin)
 
 
 Way = tuple[str, str, States]  # the filter that is loosened, how in words, and the problem then

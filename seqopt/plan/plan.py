@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -365,7 +365,10 @@ class Plan(ShownBuild):
         fields = _each_fields(self.engine, self.steps, Want.ALL)
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
-        columns.update(self.states.rules.step_columns(self.steps))
+        rules = self.states.rules
+        own = {s.number: ";".join(rules.moves[m].robot for m in s.moves) for s in rules.steps}
+        if own:  # whose grips were open
+            columns["optimized_robot"] = [own.get(step.number, nan) for step in self.steps]
         return columns
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:

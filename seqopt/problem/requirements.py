@@ -638,7 +638,7 @@ def register(*parts: Amount | Filter | Resource | Part) -> None:
                 f"{short(part)}: give an Amount, a Filter or a Resource of seqopt.problem, a "
                 "Format of seqopt.exchange or a Command of seqopt"
             )
-        taken = part.reserved() if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
+        taken = part.built_in if isinstance(part, Part) else (*BUILT_IN, *TAKEN)
         if part.name in taken:
             raise ProblemError(f"{part!r}: this name has a meaning already; give another one")
         ADDED[type(part), part.name] = part

@@ -4,7 +4,7 @@ Pictures need the extra ``plot`` and stay in `seqopt.report.draw` and `seqopt.re
 this page does not import.
 
 >>> from seqopt.engines.registry import make_engine
->>> from seqopt.network.build import build_network
+>>> from seqopt.network.network import build_network
 >>> from seqopt.report import compare, format_comparison
 >>> from seqopt.scene.scene_file import load_scene
 >>> from seqopt.study import CRITERIA

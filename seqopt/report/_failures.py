@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.errors import SeqoptError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FREE

@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import StepError
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.report._robots import Arms, Cell, _known_arms
 from seqopt.report._style import WIDTH, new_picture, styled
 from seqopt.report.draw import (

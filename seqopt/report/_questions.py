@@ -10,7 +10,7 @@ from seqopt._files import Page
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_mortar, find_engine
 from seqopt.errors import ProblemError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.criteria import Criterion
 from seqopt.questions import Built, find_build

@@ -119,7 +119,7 @@ def front_figure(
 def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
     """Draw the first goal over the first name, a line for every value of a second one.
 
-    Problems without a plan are crosses. ``table``: of `seqopt.sweep.sweep`; ``names``: its columns
+    Problems without a plan are crosses. ``table``: of `seqopt.sweep`; ``names``: its columns
     of what differs.
     """
     first, second = (*names, "")[:2]

@@ -43,7 +43,13 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
-from seqopt.study import PUBLISHED, published_about, published_plan
+from seqopt.study import (
+    IRREGULARITIES,
+    PUBLISHED,
+    is_reference_arch,
+    printed_maxima,
+    published_plan,
+)
 from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
@@ -146,8 +152,8 @@ def compare(
         for name, own in tables.items()
     }
     maxima = pd.DataFrame(worst).rename(grips | others)
-    known = published_about(scene) if tables else None
-    printed = None if known is None else known.maxima.set_axis(maxima.index)
+    in_paper = bool(tables) and is_reference_arch(scene)
+    printed = printed_maxima().set_axis(maxima.index) if in_paper else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
     fixed = [largest(scene, table) for table in tables.values()]
     plans, problem, refusal = _plans(engine, criterion, progress, robots)
@@ -177,7 +183,7 @@ def compare(
     left = (within := LinearRange(engine)).of_builds(tables)
     table, faults = _table(scene, rows, tables, left, verdicts)
     notes += faults
-    notes += [] if known is None else [f"In the paper: {text}" for text in known.irregularities]
+    notes += [f"In the paper: {text}" for text in IRREGULARITIES] if in_paper else []
     found = (maxima, printed, table, tables, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
@@ -321,8 +327,8 @@ def method_tables(
             notes.append(f"{name}: it is the {alike[0]} method here")
         built[name] = steps
         notes += _idle_note(scene, name, steps)
-    if tables and (known := published_about(scene)) is not None:
-        tables[PUBLISHED] = analyze(engine, known.steps)
+    if tables and is_reference_arch(scene):
+        tables[PUBLISHED] = analyze(engine, published_plan(scene))
     return tables, refusals + notes, refused
 
 

@@ -4,7 +4,7 @@ An engine gives forces and displacements everywhere; a response is one number of
 largest tension. `analyze` returns them as a table for given steps, each computed from scratch.
 
 >>> from seqopt.engines.registry import make_engine
->>> from seqopt.network.build import build_network
+>>> from seqopt.network.network import build_network
 >>> from seqopt.responses import RESPONSES, analyze
 >>> from seqopt.scene.scene_file import load_scene
 >>> from seqopt.sequence.methods import sequential

@@ -178,11 +178,6 @@ def short(value: object, most: int = 60) -> str:
         text = repr(value)
     except ValueError:  # an integer of more digits than Python writes
         text = "a number of thousands of digits"
-    return cut(text, most)
-
-
-def cut(text: str, most: int) -> str:
-    """Return a text of at most so many characters."""
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 

@@ -153,13 +153,16 @@ def arch_scene(
         fields = _spring_fields(place, along, rest / np.linalg.norm(rest), stiffness)
         return {**fields, "thickness": thickness}
 
-    def ground(brick: int, at: int, sign: float) -> Ground:
-        anchor = as_vector(ends[at] + sign * shape.stub * tangent[at])
-        return Ground(brick=brick, anchor=anchor, **spring(ends[at], tangent[at], tangent[at]))
-
     ways = [(way, way / np.linalg.norm(way)) for way in tangent[:-1] + tangent[1:]]
     bricks = _bricks(shape, tangent, left, ends)
-    grounds = (ground(1, 0, -1.0), ground(len(bricks), -1, 1.0))
+    grounds = tuple(
+        Ground(
+            brick=brick,
+            anchor=as_vector(ends[at] + sign * shape.stub * tangent[at]),
+            **spring(ends[at], tangent[at], tangent[at]),
+        )
+        for brick, at, sign in ((1, 0, -1.0), (len(bricks), -1, 1.0))
+    )
     return Scene(
         name=name,
         provenance=provenance,

@@ -20,7 +20,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import as_vector, as_vectors, short, units, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
+from seqopt.scene.shape import Polyhedron, _surround, fans, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
 
 optimize, spatial = Later("scipy.optimize"), Later("scipy.spatial")  # slow to import
@@ -134,7 +134,6 @@ _ERODED = (0.55, 0.45)  # of two solids, over the depth; unequal, so that no fac
 _ALIKE_NORMALS = 0.05  # of normals at a vertex: what they span less is not solved for
 _STARTS = 4  # points from which balls are grown
 _STUCK = 1e-4  # share by which a ball grows less once it is as large as can be
-_RAY = units(np.array([0.3490658, 0.5171023, 0.7817391]))  # along no face, most likely
 
 
 @dataclass(frozen=True)
@@ -199,13 +198,16 @@ def _find_overlaps(
         done, deepest, pair = i, min(tolerated[i], tolerated[j]), (solids[i], solids[j])
         for k in (i, j):
             faces[k] = faces.get(k) or _faces(solids[k].points, solids[k])
-        axes = np.array([face.axes[0] for face in (*faces[i], *faces[j])]).T
-        if min(_shared(*(_bounds_of(solid.points @ axes) for solid in pair))) <= deepest:
+        every = (*faces[i], *faces[j])
+        along = np.vstack([np.eye(3), [face.axes[0] for face in every]])
+        low, high = np.stack([_bounds_of(solid.points @ along.T) for solid in pair], axis=1)
+        over = high.min(axis=0) - low.max(axis=0)  # negative where they are apart
+        if over.min() <= deepest:
             continue
         starts = _where_both(pair, deepest)
-        radius = max((_grown((faces[i], faces[j]), start) for start in starts), default=0.0)
+        radius = max((_grown(pair, every, start) for start in starts), default=0.0)
         if 2 * radius > deepest:
-            x, y, z = _shared(bounds[i], bounds[j]).tolist()
+            x, y, z = over[:3].tolist()
             yield Overlap((i, j), 2 * radius, (x, y, z))
 
 
@@ -228,11 +230,6 @@ def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
         found = [(*each.pair, each.depth) for each in overlaps]
     found.sort(key=lambda held: -held[2])
     return [(bricks[i].name, bricks[j].name, depth) for i, j, depth in found]
-
-
-def _shared(some: Floats, others: Floats) -> Floats:
-    """Return by how much bounds (2, k) overlap (k,); negative where they are apart."""
-    return np.asarray(np.minimum(some[1], others[1]) - np.maximum(some[0], others[0]))
 
 
 def _faces(points: Floats, solid: Polyhedron) -> list[_Face]:
@@ -265,7 +262,8 @@ def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
     faces = [_faces(points, solid) for points, solid in zip(moved, pair, strict=True)]
     found = []
     for mine, other in ((0, 1), (1, 0)):
-        found.append(moved[mine][_hold(faces[other], moved[mine])])
+        triangles = moved[other][fans(pair[other].faces)]
+        found.append(moved[mine][_surround(triangles, moved[mine])])
         rims = [moved[mine][list(face)] for face in pair[mine].faces]
         start = np.vstack(rims)
         step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])
@@ -299,28 +297,16 @@ def _foot(face: _Face, point: Floats) -> Floats:
     return np.asarray(face.origin + spot @ face.axes[1:])
 
 
-def _hold(faces: Sequence[_Face], points: Floats) -> Bools:
-    """Return which points (k, 3) lie inside: a ray from there passes an odd number of faces."""
-    odd = np.zeros(len(points), dtype=bool)
-    for face in faces:
-        slope = float(face.axes[0] @ _RAY)
-        if slope != 0:
-            ahead = ((face.origin - points) @ face.axes[0]) / slope
-            met = points + ahead[:, None] * _RAY - face.origin
-            odd ^= (ahead > 0) & _within(face, met @ face.axes[1:].T)
-    return odd
-
-
-def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
+def _grown(pair: Sequence[Polyhedron], faces: Sequence[_Face], center: Floats) -> float:
     """Return the radius of a ball in two solids that is moved and grown until it is stuck; 0: none.
 
     Each program grows it between planes through its nearest points of all faces.
     """
     radius = 0.0
     while True:
-        feet = np.array([_foot(face, center) for faces in pair for face in faces])
+        feet = np.array([_foot(face, center) for face in faces])
         away = np.linalg.norm(center - feet, axis=1)
-        inside = all(_hold(faces, center[None])[0] for faces in pair)
+        inside = all(solid.contains(center) for solid in pair)
         if not inside or not away.min() > radius * (1 + _STUCK):
             return radius
         radius = float(away.min())

@@ -473,16 +473,8 @@ class _GripKinds(FrozenValue):
     of_robot: Ints  # (R,); the kind of every robot
     first: int  # least node number
     span: int  # how far apart kinds are
-
-    @cached_property
-    def rigid(self) -> bool:
-        """Whether all grips are rigid and let their nodes turn."""
-        return not (self.compliance.any() or self.turns.any() or self.arms.any())
-
-    @property
-    def gives(self) -> Bools:
-        """Which kinds (K,) are compliant to forces."""
-        return np.asarray(self.compliance[:, :3, :3].any(axis=(1, 2)) | self.arms)
+    rigid: bool  # whether all grips are rigid and let their nodes turn
+    gives: Bools  # (K,); which kinds are compliant to forces
 
     def numbers(self, nodes: Ints, robots: Sequence[int]) -> Ints:
         """Return the numbers (..., r) of grips of r robots, by index, on nodes (..., r)."""

@@ -229,7 +229,8 @@ class Scene(Shown):
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
         """Return the nodes that a robot reaches, brick by brick in build order.
 
-        Nodes that are blocked, or held by props, are not among them.
+        Nodes that are blocked, or held by props, are not among them. That of an arm is in reach if
+        a posture of it is possible when the brick is placed.
         """
         known: dict[Reach, tuple[tuple[int, ...], ...]]
         known = self.__dict__.setdefault("reached", {})
@@ -240,7 +241,13 @@ class Scene(Shown):
                 tuple(n for n in b.nodes if n not in blocked and covers(b.node_position(n)))
                 for b in self.placed
             )
-        return known[robot.reach]
+        if robot.arm is None:
+            return known[robot.reach]
+        until = from_arms("permits")(self).until[self.robots.index(robot)]
+        return tuple(
+            tuple(n for i, n in enumerate(b.nodes) if n in own and until[2 * k + i + 1] > k + 1)
+            for k, (b, own) in enumerate(zip(self.placed, known[robot.reach], strict=True))
+        )
 
     @property
     def arms(self) -> tuple[Arm | None, ...]:
@@ -357,10 +364,10 @@ class Scene(Shown):
     @cached_property
     def grip_kinds(self) -> _GripKinds:
         """Compliance of its robots where they hold, and after them of its props."""
-        soft = (r.name if r.arm and r.arm.joint_stiffness else "" for r in self.robots)
+        alone = (r.name if r.arm and r.arm.joint_stiffness else "" for r in self.robots)
         own = [
             (r.stiffness, r.rotational_stiffness, r.payload, name)
-            for r, name in zip(self.robots, soft, strict=True)
+            for r, name in zip(self.robots, alone, strict=True)
         ]
         any_force = math.nextafter(math.inf, 0)
         own += [(p.stiffness, None, p.capacity or any_force, "") for p in self.props]
@@ -371,14 +378,17 @@ class Scene(Shown):
             for at, each in zip((0, 3), given, strict=True):
                 if each is not None:
                     compliance[k, range(at, at + 3), range(at, at + 3)] = 1 / np.array(each)
+        soft, turns = np.array(arms) != "", np.array([each is not None for each in turn])
         return _GripKinds(
             compliance=compliance,
-            arms=np.array(arms) != "",
-            turns=np.array([each is not None for each in turn]),
+            arms=soft,
+            turns=turns,
             payload=np.array(payload),
             of_robot=np.array([kinds.index(each) for each in own], dtype=np.int64),
             first=min(self.brick_of_node),
             span=max(self.brick_of_node) - min(self.brick_of_node) + 1,
+            rigid=not (compliance.any() or turns.any() or soft.any()),
+            gives=compliance[:, :3, :3].any(axis=(1, 2)) | soft,
         )
 
     @cached_property
@@ -522,39 +532,14 @@ def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | No
         from_arms("find_postures")(scene, cache, tell)
 
 
-def _within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
-    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
-
-    That of an arm is in reach if a posture of it is possible when the brick is placed.
-    """
-    own = scene.within_reach(robot)
-    if robot.arm is None:
-        return own
-    until = from_arms("permits")(scene).until[scene.robots.index(robot)]
-    return tuple(
-        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
-        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
-    )
-
-
 def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
-    nodes = tuple(node for brick in _within_reach(scene, robot)[:bricks] for node in brick)
+    nodes = tuple(node for brick in scene.within_reach(robot)[:bricks] for node in brick)
     if robot.arm is None:
         return nodes
     until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
-
-
-def _go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
-    """Return which states (n,) of a scene with arms have postures that go together.
-
-    ``bricks``: how many stand; ``held`` (n, R): places in build order that robots hold, from 1;
-    none above 0 is a free robot.
-    """
-    out: Bools = from_arms("permits")(scene).allowed(bricks, held)
-    return out
 
 
 class _NoRules:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import parse_json, read_text, write_text
+from seqopt._files import parse_json, read_text, write_file
 from seqopt._registry import Later
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
@@ -73,8 +73,9 @@ def warn_of(scene: Scene, name: str) -> None:
 def _find_overlapping(scene: Scene) -> Iterator[str]:
     """Yield a line on each pair of bricks that interpenetrate by more than `TOLERATED`.
 
-    A joint without a face is checked with its bricks in `seqopt.contact.faces`: those of arches may
-    run into each other at their corners. Beams do by intent: bricks with a shape and such joints.
+    A joint without a face is checked with its bricks in `seqopt.contact.assembly`: those of arches
+    may run into each other at their corners. Beams do by intent: bricks with a shape and such
+    joints.
     """
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     faceless = [spring.ends for spring in springs if spring.face is None]
@@ -332,4 +333,4 @@ def save_scene(scene: Scene, path: Path) -> None:
     True
     """
     folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
-    write_text(path, dump_scene(scene, folder))
+    write_file(path, dump_scene(scene, folder))

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints, Vector, frozen
+from seqopt.arrays import Bools, Floats, Ints, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import frames, rows, settle, short, vector, wholes
 
@@ -109,14 +109,8 @@ class Polyhedron:
         return np.asarray(np.ptp(self.points @ axes.T, axis=0))
 
     def contains(self, point: Floats) -> bool:
-        """Return whether a point lies inside: its faces surround it once. ``point`` (3,)."""
-        a, b, c = np.moveaxis(self.triangles - point, 1, 0)
-        lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
-        above = np.einsum("ti,ti->t", a, np.cross(b, c))
-        below = lengths[0] * lengths[1] * lengths[2]
-        for i, (one, other) in enumerate(((b, c), (c, a), (a, b))):
-            below = below + np.einsum("ti,ti->t", one, other) * lengths[i]
-        return bool(abs(np.arctan2(above, below).sum()) > np.pi)  # half of the solid angle
+        """Return whether a point lies inside. ``point`` (3,)."""
+        return bool(_surround(self.triangles, point[None])[0])
 
     def nodes(self) -> tuple[Vector, Vector]:
         """Return where its inner nodes lie if nobody says, from the centroid, m.
@@ -131,6 +125,18 @@ class Polyhedron:
         found = next(inside, steps[0])
         x, y, z = (found + 0.0).tolist()
         return (0.0 - x, 0.0 - y, 0.0 - z), (x, y, z)
+
+
+def _surround(triangles: Floats, points: Floats) -> Bools:
+    """Return which points (k, 3) lie inside a solid: its triangles (T, 3, 3) surround them once."""
+    a, b, c = np.moveaxis(triangles - points[:, None, None], 2, 0)
+    lengths = [np.linalg.norm(side, axis=2) for side in (a, b, c)]
+    above = np.einsum("kti,kti->kt", a, np.cross(b, c))
+    below = lengths[0] * lengths[1] * lengths[2]
+    for i, (one, other) in enumerate(((b, c), (c, a), (a, b))):
+        below = below + np.einsum("kti,kti->kt", one, other) * lengths[i]
+    halves = np.arctan2(above, below).sum(axis=1)  # of the solid angles
+    return np.asarray(np.abs(halves) > np.pi)
 
 
 def edges(face: Sequence[_Corner]) -> Iterator[tuple[_Corner, _Corner]]:

@@ -3,7 +3,7 @@
 A step places a brick, releases grips or takes a new grip. A sequence is a list of steps, checked in
 its scene. A schedule is a sequence in which some grips are still to be chosen.
 
->>> from seqopt.network.build import build_network
+>>> from seqopt.network.network import build_network
 >>> from seqopt.scene.scene_file import load_scene
 >>> from seqopt.sequence import sequential, three_robot_loop
 >>> network = build_network(load_scene("arch25"))

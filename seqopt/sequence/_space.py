@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import accumulate, chain, pairwise
 from math import prod
 from typing import Any, NamedTuple
 
@@ -23,7 +23,9 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
-from seqopt.scene.scene import Scene, _go_together, _within_reach
+from seqopt.scene._checks import settle
+from seqopt.scene.arm import from_arms
+from seqopt.scene.scene import Scene
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried, islands
@@ -50,24 +52,12 @@ class Moves(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """All choices of the grips that are open at a level, whether or not a build reaches them.
+    """All choices of the grips that are open at a level, whether or not a build reaches them."""
 
-    Attributes
-    ----------
-    columns : tuple of int
-        Columns of the robots whose grips are open, those that were taken first before others.
-    places : tuple of (C,) int
-        The places that each of them may hold.
-    states : (P, c) int
-        States of the possible choices: a place for each robot that no other one holds.
-    possible : (C,) or (C, D) bool
-        Which choices these are, in the same order.
-    """
-
-    columns: tuple[int, ...]
-    places: tuple[Ints, ...]
-    states: Ints
-    possible: Bools
+    columns: tuple[int, ...]  # of the robots whose grips are open, those taken first before others
+    places: tuple[Ints, ...]  # (C,) each; the places that each of them may hold
+    states: Ints  # (P, c); of possible choices: a place for each robot that no other one holds
+    possible: Bools  # (C,) or (C, D); which choices these are, in the same order
 
     def rows(self, states: Ints) -> tuple[Ints, ...]:
         """Return where choices of states (n, c) stand in arrays of the shape of ``possible``."""
@@ -106,36 +96,36 @@ class StateRows(Terse):
     rules: Any
     kinds: tuple[RobotKind, ...]
     parks: bool
+    first: int  # level at the beginning of the build
+    levels: int  # level at its end
+    ends_bare: bool  # whether every build ends without grips
+    robots: int  # how many take part
+    slots: tuple[tuple[int, int], ...]  # first column of every kind, and the one after its last
+    _bricks: Sequence[int]  # how many stand, by level
+    _span: tuple[int, int]  # of rules: how many stand at the beginning and at the end
+    _place: Mapping[int | None, int]  # of nodes in build order, from 1
+    _at: Floats  # (2B + 1, 3); positions of nodes, m; the first is for none
 
     def __post_init__(self) -> None:
+        scene, counts = self.network.scene, [len(kind.robots) for kind in self.kinds]
         base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
         regrips = getattr(self.rules, "regrips", None) or 0
-        if base**self.robots * (1 + regrips) >= 2**62:  # codes of a level are int64
+        if base ** sum(counts) * (1 + regrips) >= 2**62:  # codes of a level are int64
             raise StepError(
-                f"scene {self.network.scene.name}: {len(self.network.inner)} bricks and "
-                f"{self.robots} robots have more states than can be numbered; let fewer robots "
-                "take part"
+                f"scene {scene.name}: {len(self.network.inner)} bricks and {sum(counts)} robots "
+                "have more states than can be numbered; let fewer robots take part"
             )
+        settle(
+            self,
+            robots=sum(counts),
+            slots=tuple(pairwise(accumulate(counts, initial=0))),
+            _place={node: i for i, node in enumerate(scene.placed_nodes, start=1)},
+            _at=np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0))),
+        )
 
-    @property
-    def robots(self) -> int:
-        """Number of participating robots."""
-        return sum(len(kind.robots) for kind in self.kinds)
-
-    @cached_property
-    def slots(self) -> tuple[tuple[int, int], ...]:
-        """First column of every kind, and the one after its last."""
-        return tuple(pairwise(np.cumsum([0, *(len(kind.robots) for kind in self.kinds)]).tolist()))
-
-    @cached_property
-    def _place(self) -> dict[int | None, int]:
-        """The places of nodes in build order, from 1."""
-        return {node: i for i, node in enumerate(self.network.scene.placed_nodes, start=1)}
-
-    @cached_property
-    def _at(self) -> Floats:
-        """Positions of nodes (2B + 1, 3), m; the first is for none."""
-        return np.pad(self.network.node_position[self.network.inner.ravel()], ((1, 0), (0, 0)))
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand on a level."""
+        return self._bricks[level]
 
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) are feasible for arms at a brick count, (n,)."""
@@ -144,7 +134,7 @@ class StateRows(Terse):
             return np.ones(len(states), dtype=bool)
         held = np.zeros((len(states), len(scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return _go_together(scene, bricks, held)
+        return np.asarray(from_arms("permits")(scene).allowed(bricks, held))
 
     def codes(self, states: Ints) -> Ints:
         """Return a code (n,) per state (n, c), unique in its level."""
@@ -179,28 +169,11 @@ class FreeSpace(StateRows):
     kinds: tuple[RobotKind, ...]
     parks: bool = False  # free robots stay where they were, for their travel
 
-    @cached_property
-    def _span(self) -> tuple[int, int]:
-        return self.rules.span(self.network.scene)
-
-    @property
-    def first(self) -> int:
-        """Level at the beginning of the build."""
-        return self._span[0]
-
-    @property
-    def levels(self) -> int:
-        """Level at the end of the build."""
-        return self._span[1]
-
-    def bricks_at(self, level: int) -> int:
-        """Return how many bricks stand on a level."""
-        return level
-
-    @property
-    def ends_bare(self) -> bool:
-        """Whether every build ends in the finished structure without grips."""
-        return self.rules.how_it_ends is not Ending.HELD
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        first, last = span = self.rules.span(self.network.scene)
+        bare = self.rules.how_it_ends is not Ending.HELD
+        settle(self, _span=span, first=first, levels=last, ends_bare=bare, _bricks=range(last + 1))
 
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the state (1, c) in which every build ends, if it is unique."""
@@ -265,7 +238,7 @@ class FreeSpace(StateRows):
     def _holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot grips a placed brick."""
         begins = self.rules.begin is not None and bricks == self._span[0]
-        begins &= not self._lets_go_one_by_one(bricks)
+        begins &= bricks != self._span[1] or self.rules.how_it_ends is not Ending.ONE_BY_ONE
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
@@ -280,8 +253,8 @@ class FreeSpace(StateRows):
     def _releases(self, bricks: int, states: Ints) -> Moves:
         """Return the feasible moves in which one robot releases, or at the end all do."""
         moves = self._lets_go(states, states[:, : self.robots] > 0)
-        if not self._lets_go_one_by_one(bricks):
-            moves = self._lawful_only(bricks, moves)
+        if bricks != self._span[1] or self.rules.how_it_ends is not Ending.ONE_BY_ONE:
+            moves = self._lawful_only(bricks, moves)  # at the end they may go against the rules
         if bricks != self._span[1] or not self.ends_bare:
             return moves
         if self.rules.how_it_ends is Ending.RELEASED:
@@ -290,10 +263,6 @@ class FreeSpace(StateRows):
             moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
         moves.states[self.grips(moves.states) == 0, : self.robots] = 0  # it forgets where they were
         return moves
-
-    def _lets_go_one_by_one(self, bricks: int) -> bool:
-        """Return whether at a brick count robots may only release, even against the rules."""
-        return bricks == self._span[1] and self.rules.how_it_ends is Ending.ONE_BY_ONE
 
     def _lets_go(self, states: Ints, may: Bools) -> Moves:
         """Return the moves in which one robot releases; ``may`` (n, robots): the feasible ones."""
@@ -454,16 +423,11 @@ def _follow(
 class _TakeDownSpace(FreeSpace):
     """The states of a take-down: those of building, with moves that remove bricks."""
 
-    first = 1  # level 0 is the empty site of builds, before which there is nothing to do
-
-    @property
-    def levels(self) -> int:
-        """The last level: each removed brick leads to the next level."""
-        return 1 + self._span[0] - self._span[1]
-
-    def bricks_at(self, level: int) -> int:
-        """Return how many bricks stand on a level."""
-        return 1 + self._span[0] - level
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole, left = self._span  # each removed brick leads to the next level
+        # level 0 is the empty site of builds, before which there is nothing to do
+        settle(self, first=1, levels=1 + whole - left, _bricks=range(1 + whole, -1, -1))
 
     def steps_to_go(self, level: int, states: Ints) -> Floats:
         """Return lower bounds of steps to an end: bricks are gripped before removal."""
@@ -503,7 +467,7 @@ def free_space(
     alike: dict[tuple[object, ...], RobotKind] = {}
     for i in rules.team(scene):
         robot = scene.robots[i]
-        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(_within_reach(scene, robot))])
+        reach = np.isin(scene.placed_nodes, [*chain.from_iterable(scene.within_reach(robot))])
         newest = reach if rules.newest is not Newest.PLACING else np.zeros_like(reach)
         for k, brick in enumerate(scene.placed if newest is not reach else ()):
             with suppress(StepError):  # it reaches none
@@ -516,7 +480,7 @@ def free_space(
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
     space = _TakeDownSpace if rules.takes_down else FreeSpace
-    return space(network, rules.begun(scene), tuple(alike.values()), parks)
+    return space(network, rules.in_scene(scene), tuple(alike.values()), parks)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -529,36 +493,24 @@ class ScheduleSpace(StateRows):
     parks: bool = False  # free robots stay where they were, for their travel
     worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
 
-    first = 0  # the level before the first step
-
-    @property
-    def levels(self) -> int:
-        """Number of steps, equal for all builds."""
-        return len(self.rules.steps)
-
-    @property
-    def ends_bare(self) -> bool:
-        """Whether the last step has no grips."""
-        return all(grip is None for grip in self.rules.steps[-1].grips)
+    def __post_init__(self) -> None:
+        every, robots = np.ones(2 * len(self.network.inner), dtype=bool), self.network.scene.robots
+        caps = [self.caps.get(robot.name, np.inf) for robot in robots]
+        # a kind per robot: they are not interchangeable, steps say who carries
+        kinds = tuple(RobotKind((i,), every, every, every[::2], c) for i, c in enumerate(caps))
+        settle(self, kinds=kinds)
+        super().__post_init__()
+        steps = self.rules.steps  # a level for each, and one before the first
+        bare, bricks = not any(g is not None for g in steps[-1].grips), (s.bricks for s in steps)
+        settle(self, first=0, levels=len(steps), ends_bare=bare, _bricks=(0, *bricks))
 
     def steps_to_go(self, level: int, states: Ints) -> Floats:
         """Return the number of steps to the end, (n,)."""
         return np.full(len(states), float(self.levels - level))
 
-    def bricks_at(self, level: int) -> int:
-        """Return the brick count after a number of steps."""
-        return self.rules.steps[level - 1].bricks if level else 0
-
     def may_place(self, level: int, states: Ints) -> Bools:
         """Return from which states the next step is feasible: all, (n,)."""
         return np.ones(len(states), dtype=bool)
-
-    @cached_property
-    def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
-        """A kind per robot: robots of a schedule are not interchangeable, steps say who carries."""
-        every = np.ones(2 * len(self.network.inner), dtype=bool)
-        caps = [self.caps.get(robot.name, np.inf) for robot in self.network.scene.robots]
-        return tuple(RobotKind((i,), every, every, every[::2], c) for i, c in enumerate(caps))
 
     @cached_property
     def _too_heavy(self) -> frozenset[int]:

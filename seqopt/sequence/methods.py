@@ -1,7 +1,7 @@
 """Methods: rules that turn a scene into the steps that build it, with given or with open grips.
 
 Roles (which robot places and which holds) are filled by reach or by name. A method lists its acts,
-and `_steps` makes steps of them.
+and `_schedule` makes steps of them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from itertools import permutations
 import numpy as np
 
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.build import network_of
-from seqopt.network.network import Network, PartKind
+from seqopt.network.network import Network, PartKind, network_of
 from seqopt.scene.parts import Brick, Robot, Side
-from seqopt.scene.scene import Scene, _reachable, _within_reach
+from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 
@@ -73,7 +72,7 @@ def _take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if _within_reach(scene, scene.robots[robot])[k]}
+        able = {robot for robot in rank if scene.within_reach(scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
@@ -101,7 +100,7 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
 
     Bricks are indices in build order; of all assignments the lexicographically first, by role.
     """
-    reach = {r: _within_reach(scene, scene.robots[r]) for r in robots}
+    reach = {r: scene.within_reach(scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
 
     @cache  # as many calls as there are sets of robots, not orders
@@ -132,32 +131,13 @@ def lies_along(network: Network) -> frozenset[int]:
     return frozenset(brick.name for brick in network.scene.placed if met.issuperset(brick.nodes))
 
 
-def _begins_elsewhere(network: Network) -> frozenset[int]:
-    """Return the names of bricks at which the cantilever method turns to another part.
-
-    A stretch is a brick that is held while others are placed, and these others. A brick begins
-    elsewhere if no joint ties it to the stretch that is being built; so does the first one.
-    """
-    springs, tied = network.springs, defaultdict[int, set[int]](set)
-    for a, b in springs.bodies[springs.stiffness.any(axis=1)].tolist():
-        tied[b].add(a)  # the lower one first
-    along, stretch, out = lies_along(network), set[int](), set[int]()
-    for k, brick in enumerate(network.scene.placed):
-        if stretch.isdisjoint(tied[k]):
-            out.add(brick.name)
-        if brick.name in along | out:
-            stretch = set()
-        stretch.add(k)
-    return frozenset(out)
-
-
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     """Return the node at which a robot holds a brick that it places.
 
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
     """
-    free = _within_reach(network.scene, robot)[network.scene.since[brick.name] - 1]
+    free = network.scene.within_reach(robot)[network.scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
@@ -169,16 +149,16 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-def _steps(scene: Scene, acts: Iterable[_Act]) -> list[OpenStep]:
-    """Return the steps of acts, numbered from 1; an act that changes no grip is none."""
-    grips: tuple[_Grip, ...] = (None,) * len(scene.robots)
-    out: list[OpenStep] = []
+def _schedule(method: str, network: Network, acts: Iterable[_Act]) -> Schedule:
+    """Return the schedule of acts, numbered from 1; an act that changes no grip is no step."""
+    grips: tuple[_Grip, ...] = (None,) * len(network.scene.robots)
+    steps: list[OpenStep] = []
     for kind, bricks, changes in acts:
         before = grips
         grips = tuple(changes.get(robot, grip) for robot, grip in enumerate(before))
         if grips != before:
-            out.append(OpenStep(len(out) + 1, kind, bricks, grips))
-    return out
+            steps.append(OpenStep(len(steps) + 1, kind, bricks, grips))
+    return open_schedule(method, network, steps)
 
 
 def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> Schedule:
@@ -211,8 +191,8 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
 
 def _alternate(
     network: Network, method: str, swaps: Set[int], robots: Sequence[str], *, open_: bool = False
-) -> list[OpenStep]:
-    """Return the steps in which two robots place and hold by turns, at placing or at open nodes.
+) -> Schedule:
+    """Return the schedule of two robots that place and hold by turns, at placing or at open nodes.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
     ``swaps``: names of bricks after which the robot that placed them holds on.
@@ -226,7 +206,7 @@ def _alternate(
         stays = placer if count == 1 or brick.name in swaps else holder
         leave = {*range(len(scene.robots))} - {stays if count < len(pairs) else -1}
         acts.append((StepKind.RELEASE, count, dict.fromkeys(leave)))
-    return _steps(scene, acts)
+    return _schedule(method, network, acts)
 
 
 def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -263,8 +243,7 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     (None, 2, 1)
     """
     network = network_of(network)
-    steps = _alternate(network, "sequential", {*network.scene.build_order}, robots)
-    return open_schedule("sequential", network, steps).fill(())
+    return _alternate(network, "sequential", {*network.scene.build_order}, robots).fill(())
 
 
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -295,9 +274,15 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
     network = network_of(network)
-    swaps = lies_along(network) | _begins_elsewhere(network)
-    steps = _alternate(network, "cantilever", swaps, robots)
-    return open_schedule("cantilever", network, steps).fill(())
+    springs, tied = network.springs, defaultdict[int, set[int]](set)
+    for a, b in springs.bodies[springs.stiffness.any(axis=1)].tolist():
+        tied[b].add(a)  # the lower one first
+    swaps, stretch = {*lies_along(network)}, set[int]()  # what is held while others are placed
+    for k, brick in enumerate(network.scene.placed):
+        if stretch.isdisjoint(tied[k]):  # it begins elsewhere; so does the first one
+            swaps.add(brick.name)
+        stretch = {k} if brick.name in swaps else stretch | {k}
+    return _alternate(network, "cantilever", swaps, robots).fill(())
 
 
 METHODS: dict[str, Callable[..., tuple[Step, ...]]] = {
@@ -313,9 +298,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     move after it; its candidates are the nodes of the brick that it places.
     """
     network = network_of(network)
-    every = {*network.scene.build_order}
-    steps = _alternate(network, "two-robot", every, robots, open_=True)
-    return open_schedule("two-robot", network, steps)
+    return _alternate(network, "two-robot", {*network.scene.build_order}, robots, open_=True)
 
 
 def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
@@ -364,7 +347,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
         acts.append((StepKind.RELEASE, count + move, {order[placer]: None}))
         place(placer, count + move + 1)
         acts.append((StepKind.RELEASE, count + move + 1, {order[oldest]: None}))
-    return open_schedule(f"{_in_words(count)}-robot", network, _steps(scene, acts))
+    return _schedule(f"{_in_words(count)}-robot", network, acts)
 
 
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
@@ -470,7 +453,7 @@ def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) ->
                 )
             support, moves = {helper: OpenGrip(moves)}, moves + 1
             acts.append((StepKind.REPOSITION, step.bricks, given | support))
-    return open_schedule("modified-sequential", network, _steps(scene, acts))
+    return _schedule("modified-sequential", network, acts)
 
 
 SCHEDULES: dict[str, Callable[..., Schedule]] = {

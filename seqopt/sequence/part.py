@@ -142,19 +142,9 @@ class Part:
             raise StepError("{} {}: {}".format(*changes[0], said))
         return begin
 
-    def change(self, scene: Scene, site: Site | None) -> tuple[Scene, Site | None]:
-        """Return scene and beginning without what is lost or missing."""
-        if site is None or not (self.lost or self.missing):
-            return scene, site
-        return without(scene, site, self.lost, [*map(int, self.missing)])
-
-    def find_end(self, scene: Scene) -> Site | None:
-        """Return where it ends, None if with the finished structure."""
-        return _find_place(self.to, "to", scene).site
-
 
 def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene) -> _Place:
-    """Return where a build begins or ends."""
+    """Return where a build begins or ends; ``name``: what of a part says it, for messages."""
     text = str(given)
     try:
         if given is None or isinstance(given, Site | _Place):

@@ -19,7 +19,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
-from seqopt.sequence.schedule import Move, Near
+from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -81,7 +81,7 @@ class FreeRules:
         and once a state violates them, only release; also if a build begins in such a state.
     candidates : str
         At which nodes placed bricks may be gripped: ``near:6``, as of
-        `seqopt.sequence.schedule.Near`; by default wherever robots reach.
+        `seqopt.sequence.schedule.thin`; by default wherever robots reach.
     begin : Site or None
         Where the build begins; by default with the empty site. This state need not keep rules or
         limits; until rules are kept for the first time, robots may only take grips, except where
@@ -144,7 +144,7 @@ class FreeRules:
             if not isinstance(getattr(self, name), Site | None):
                 raise StepError(f"rule {name}: {short(getattr(self, name))}; give a seqopt.Site")
         if self.candidates:
-            settle(self, candidates=Near(self.candidates).rule)
+            settle(self, candidates=near_rule(self.candidates))
 
     def span(self, scene: Scene) -> tuple[int, int]:
         """Return the brick counts at the beginning and at the end of the build."""
@@ -196,8 +196,8 @@ class FreeRules:
         """Return which moves from levels to levels, (m,), place a brick."""
         return np.asarray(after > before)
 
-    def begun(self, scene: Scene) -> FreeRules:
-        """Return the rules with the beginning of a take-down, by default without grips."""
+    def in_scene(self, scene: Scene) -> FreeRules:
+        """Return the rules in a scene: where a take-down begins, by default without grips."""
         if not self.takes_down or self.begin is not None:
             return self
         bare = Site(len(scene.placed), (None,) * len(scene.robots), step=0)
@@ -216,9 +216,9 @@ class FreeRules:
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of the placed bricks that may be gripped."""
         nodes = scene.placed_nodes[: 2 * bricks]
-        if not self.candidates or not nodes:
-            return frozenset(nodes)
-        return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
+        if self.candidates and nodes:
+            nodes = _near_nodes(self.candidates, scene, bricks, nodes)
+        return frozenset(nodes)
 
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return the indices of the participating robots of a scene, ascending."""
@@ -272,6 +272,7 @@ class FreeRules:
         }
 
     method, has_pairs = FREE, False  # it is no list of steps with open grips
+    steps: ClassVar[tuple[OpenStep, ...]] = ()
     moves: ClassVar[tuple[Move, ...]] = ()
 
     @property
@@ -282,10 +283,6 @@ class FreeRules:
     def names_robots(self, *, in_pairs: bool = False) -> bool:
         """Return whether states say which robot holds: not of those that are alike."""
         return False
-
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of a table of steps: none."""
-        return {}
 
     def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
         """Raise a `ProblemError`: there are no moves to be chosen."""
@@ -305,10 +302,6 @@ class FreeRules:
                 break
             count += 1
         return count
-
-    def in_scene(self, scene: Scene) -> FreeRules:
-        """Return the rules in another scene: unchanged, as they refer to none."""
-        return self
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
         """Yield the rules with one of them relaxed, and its command-line words."""
@@ -351,18 +344,11 @@ RULES = ("newest", "payload", "ending", "placers", "candidates", *_COUNTS)
 """Names of rules in words."""
 
 
-def parse_rules(
-    given: FreeRules | str | Sequence[FreeRules | str],
-    robots: tuple[str, ...] = (),
-    where: str = "rules",
-) -> FreeRules:
-    """Parse rules from words, ``least_grips=1``, or return given ones, for robots by name.
-
-    ``where``: for messages.
-    """
+def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules:
+    """Parse rules from words, ``least_grips=1``, or return given ones."""
     several = given if isinstance(given, list | tuple) else (given,)
     if {*map(type, several)} - {str, FreeRules}:
-        raise StepError(f"{where} {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
+        raise StepError(f"rules {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
     found, loosest = FreeRules(), {(name, said): value for name, value, said in _LOOSEST}
     for each in several:
         if not isinstance(each, str):
@@ -371,12 +357,12 @@ def parse_rules(
         name, _, text = each.partition("=")
         if name not in RULES:
             hint, known = did_you_mean(name, RULES), ", ".join(RULES)
-            raise StepError(f"{where} {each} does not exist{hint}; give one of {known}")
+            raise StepError(f"rules {each} does not exist{hint}; give one of {known}")
         value: object = int(text) if name in _COUNTS and text.isdecimal() else text
         if name == "placers":
             value = tuple(part.strip() for part in text.split(","))
         found = replace(found, **{name: loosest.get((name, text), value)})  # type: ignore[arg-type]
-    return replace(found, robots=robots) if robots else found
+    return found
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
@@ -469,7 +455,7 @@ class _RuleBook:
     @property
     def start(self) -> tuple[int, Grips, int]:
         """Bricks, grips, and regrips since the last brick, at the beginning of the build."""
-        site = self.rules.begun(self.network.scene).begin
+        site = self.rules.in_scene(self.network.scene).begin
         if site is None:
             return 0, (None,) * len(self.network.scene.robots), 0
         return site.bricks, site.holds(self.network.scene), site.regrips

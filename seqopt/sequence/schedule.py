@@ -34,32 +34,27 @@ _RULE = re.compile(r"near:([0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
 
 
-@dataclass(frozen=True)
-class Near:
-    """A restriction of candidates to nodes near the working end of a build.
+def near_rule(rule: str) -> str:
+    """Return a rule that restricts candidates to nodes near the working end of a build, checked.
 
-    ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
-    placed last.
+    ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks placed last.
     """
+    text = rule.strip() if isinstance(rule, str) else ""
+    if _RULE.fullmatch(text) is None:
+        hint = did_you_mean(str(rule).partition(":")[0], ("near",))
+        raise StepError(f"candidates {rule!r}{hint}: give near:JOINTS, as near:12")
+    return text
 
-    rule: str
 
-    def __post_init__(self) -> None:
-        text = self.rule.strip() if isinstance(self.rule, str) else ""
-        if _RULE.fullmatch(text) is None:
-            hint = did_you_mean(str(self.rule).partition(":")[0], ("near",))
-            raise StepError(f"candidates {self.rule!r}{hint}: give near:JOINTS, as near:12")
-        object.__setattr__(self, "rule", text)
-
-    def nodes(self, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
-        """Select the nodes that are near at a brick count, or else the nearest ones."""
-        placed = scene.build_order[:bricks]
-        graph = nx.Graph(j.bricks for j in scene.joints if {*j.bricks} <= {*placed})
-        graph.add_nodes_from(placed)
-        joints = nx.multi_source_dijkstra_path_length(graph, {*placed[-_NEWEST:]})
-        away = {n: joints.get(scene.brick_of_node[n].name, math.inf) for n in nodes}
-        limit = max(int(self.rule.partition(":")[2]), min(away.values(), default=0))
-        return tuple(node for node in nodes if away[node] <= limit)
+def _near_nodes(rule: str, scene: Scene, bricks: int, nodes: Sequence[int]) -> tuple[int, ...]:
+    """Select the nodes that are near at a brick count by a rule, or else the nearest ones."""
+    placed = scene.build_order[:bricks]
+    graph = nx.Graph(j.bricks for j in scene.joints if {*j.bricks} <= {*placed})
+    graph.add_nodes_from(placed)
+    joints = nx.multi_source_dijkstra_path_length(graph, {*placed[-_NEWEST:]})
+    away = {n: joints.get(scene.brick_of_node[n].name, math.inf) for n in nodes}
+    limit = max(int(rule.partition(":")[2]), min(away.values(), default=0))
+    return tuple(node for node in nodes if away[node] <= limit)
 
 
 @dataclass(frozen=True)
@@ -164,29 +159,20 @@ class Schedule(Shown):
 
     begin: ClassVar[None] = None  # it builds from the empty site
 
-    def require_pairs(self) -> None:
-        """Raise a `StepError` if more than two moves, or two not neighboring, share a step.
+    def names_robots(self, *, in_pairs: bool = False) -> bool:
+        """Return whether steps say which robot holds: they do.
 
-        What ranks or compares candidates of moves needs that; what chooses states does not.
+        ``in_pairs``: raise a `StepError` if more than two moves, or two not neighboring, share a
+        step. What ranks or compares candidates of moves needs that; what chooses states does not.
         """
-        for step in self.steps:
+        for step in self.steps if in_pairs else ():
             if step.moves and step.moves[-1] - step.moves[0] > 1:
                 raise StepError(
                     f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
                     "to rank candidates at most two neighboring ones can be; take worst-ratio "
                     "or weighted"
                 )
-
-    def names_robots(self, *, in_pairs: bool = False) -> bool:
-        """Return whether steps say which robot holds: they do; ``in_pairs``: `require_pairs`."""
-        if in_pairs:
-            self.require_pairs()
         return True
-
-    def step_columns(self, steps: Sequence[Step]) -> dict[str, list[object]]:
-        """Return further columns of a table of steps: the robots whose grips were open."""
-        own = {s.number: ";".join(self.moves[m].robot for m in s.moves) for s in self.steps}
-        return {"optimized_robot": [own.get(step.number, np.nan) for step in steps]}
 
     def chosen(self, steps: Sequence[Step]) -> tuple[int, ...]:
         """Return the node that every move takes in a sequence."""
@@ -213,10 +199,6 @@ class Schedule(Shown):
             "regrips in a Pareto set, go with the free schedule"
         )
 
-    def begun(self, scene: Scene) -> Schedule:
-        """Return the schedule, which says itself where it begins."""
-        return self
-
     def keeps_payloads(self, *, stands: bool) -> bool:
         """Return whether robots hold no more than their payloads: where states must stand."""
         return stands
@@ -236,7 +218,7 @@ class Schedule(Shown):
 
     def in_scene(self, scene: Scene) -> Schedule:
         """Return the same steps of another scene with the same bricks, nodes and robots."""
-        return replace(self, scene=scene)
+        return self if scene is self.scene else replace(self, scene=scene)
 
     def loosened(self, scene: Scene) -> Iterator[tuple[str, Schedule]]:
         """Yield relaxations: given steps have none."""
@@ -270,7 +252,7 @@ class Schedule(Shown):
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:
-    """Return a schedule with the candidates near the working end alone, by a rule of `Near`.
+    """Return a schedule with the candidates near the working end alone, by a `near_rule`.
 
     It says what was left out.
 
@@ -281,15 +263,15 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     >>> thin(schedule, "near:3").left_out
     'near:3 keeps 173 of 492 candidates'
     """
-    near, scene = Near(rule), schedule.scene
+    near, scene = near_rule(rule), schedule.scene
     moves = tuple(
-        replace(move, candidates=near.nodes(scene, move.bricks, move.candidates))
+        replace(move, candidates=_near_nodes(near, scene, move.bricks, move.candidates))
         for move in schedule.moves
     )
     kept, all_ = (sum(len(m.candidates) for m in some) for some in (moves, schedule.moves))
     if kept == all_:
         return schedule
-    said = f"{near.rule} keeps {kept:,} of {all_:,} candidates"
+    said = f"{near} keeps {kept:,} of {all_:,} candidates"
     return replace(schedule, moves=moves, left_out=said)
 
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from seqopt._files import Row, harmless, read_table, read_text
 from seqopt.errors import StepError
-from seqopt.network.build import network_of
-from seqopt.network.network import Network
+from seqopt.network.network import Network, network_of
 from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene

@@ -23,12 +23,10 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import PartialAssemblies
+from seqopt.contact.assembly import Assembly, PartialAssemblies
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SceneWarning, did_you_mean
-from seqopt.network.build import network_of
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import GROUND, Network, network_of
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import _find_overlapping
 from seqopt.sequence.steps import Grips, Step, require_steps

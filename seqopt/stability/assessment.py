@@ -16,12 +16,10 @@ import numpy as np
 
 from seqopt._registry import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import SceneError
-from seqopt.network.build import network_of
-from seqopt.network.network import Network
+from seqopt.network.network import Network, network_of
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability.limit_analysis import (
@@ -103,9 +101,9 @@ class Stability(Shown, FrozenValue):
 
     Examples
     --------
-    >>> from seqopt.contact.faces import step_assembly
+    >>> from seqopt.contact.assembly import step_assembly
     >>> from seqopt.contact.mortar import DRY
-    >>> from seqopt.network.build import build_network
+    >>> from seqopt.network.network import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> network = build_network(load_scene("arch25"))
     >>> stability = assess(step_assembly(network, 3, (None, None, None)), DRY)

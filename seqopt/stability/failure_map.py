@@ -17,8 +17,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._registry import display
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import PartialAssemblies
+from seqopt.contact.assembly import Assembly, PartialAssemblies
 from seqopt.contact.mortar import (
     DRY,
     EPOXY,
@@ -30,8 +29,7 @@ from seqopt.contact.mortar import (
     find_mortar,
 )
 from seqopt.errors import SceneError
-from seqopt.network.build import build_network
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import GROUND, Network, build_network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._steps import each_verdict

@@ -3,7 +3,7 @@
 The paper is arXiv 2104.04856. No other part of seqopt uses numbers from it.
 
 >>> from seqopt.engines.registry import make_engine
->>> from seqopt.network.build import build_network
+>>> from seqopt.network.network import build_network
 >>> from seqopt.responses.table import analyze
 >>> from seqopt.scene.scene_file import load_scene
 >>> from seqopt.study import CRITERIA, printed_maxima, published_plan
@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import re
 from importlib import resources
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -113,10 +112,10 @@ Examples
 _BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 
 
-def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Criterion:
+def find_criterion(criterion: Criterion | str) -> Criterion:
     """Return a criterion: itself, by name of `seqopt.CRITERIA`, or ranks, as ``T_max,M_sup=2``.
 
-    A weight is 1 by default; ``where``: for messages.
+    A weight is 1 by default.
     """
     if not isinstance(criterion, str):
         return criterion
@@ -129,9 +128,9 @@ def find_criterion(criterion: Criterion | str, where: str = "criterion") -> Crit
             names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
             hint, known = did_you_mean(name, names), ", ".join(names)
             raise ProblemError(
-                f"{where} {name} does not exist{hint}; give one of {known}, F_ROBOT, or several"
+                f"criterion {name} does not exist{hint}; give one of {known}, F_ROBOT, or several"
             )
-        terms.append((name, number_word(weight or "1", f"{where} {part}")))
+        terms.append((name, number_word(weight or "1", f"criterion {part}")))
     return RankSum(criterion, tuple(terms), tuple(terms))
 
 
@@ -275,18 +274,3 @@ def printed_maxima() -> pd.DataFrame:
     """
     table = printed("improvement_3robot").drop(columns=["quantity", "unit"])
     return table[[*PRINTED_COLUMN.values()]].set_axis([*PRINTED_COLUMN], axis=1)
-
-
-class Published(NamedTuple):
-    """What is printed about a scene: a plan, the largest responses, and what does not fit in it."""
-
-    steps: tuple[Step, ...]
-    maxima: pd.DataFrame
-    irregularities: tuple[str, ...]
-
-
-def published_about(scene: Scene) -> Published | None:
-    """Return what is printed about a scene; None of all but the arch of Bruun et al."""
-    if not is_reference_arch(scene):
-        return None
-    return Published(published_plan(scene), printed_maxima(), IRREGULARITIES)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.contact.faces import PartialAssemblies, _contact_at
+from seqopt.contact.assembly import PartialAssemblies, _contact_at
 from seqopt.contact.mortar import Curing, Mortar
 from seqopt.errors import StepError
 from seqopt.network.network import Network

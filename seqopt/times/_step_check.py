@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.errors import SolverError
 from seqopt.graph.states import States
 from seqopt.judge.arithmetic import BETTER

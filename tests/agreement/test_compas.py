@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import bare_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.exchange._content import Given
 from seqopt.exchange.contacts import flat_face
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import Verdict, assess
 

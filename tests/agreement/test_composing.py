@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
 from seqopt.graph._candidates import walk

@@ -18,7 +18,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.exchange._content import Given
 from seqopt.exchange.imports import import_scene
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import ABOUT, load_scene
 from seqopt.sequence.methods import METHODS

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from experiments.stability.parts.blocks import ring, stack
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 import seqopt
 from experiments.stability.parts.blocks import ring
-from seqopt.contact.faces import PartialAssemblies, step_assembly
+from seqopt.contact.assembly import PartialAssemblies, step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.errors import SceneError
 from seqopt.scene import Load

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from seqopt._cli.main import main
 from seqopt.exchange._tasks import FRAMES, plan_tasks
 from seqopt.exchange.exports import export
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.sequence.methods import METHODS
 from tests.builders import ROOT, six_bricks
 

@@ -8,9 +8,9 @@ import pytest
 import seqopt
 from seqopt._cli.arguments import request
 from seqopt._cli.main import main
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.signatures import Call, signature_of
 from seqopt._cli.words import HIDDEN
-from seqopt._registry import COMMANDS
 from seqopt.contact.mortar import DRY, EPOXY, find_mortar
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.workflow import optimize, pose_build

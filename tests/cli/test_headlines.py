@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt._registry import COMMANDS, every_command
+from seqopt._cli.registry import COMMANDS, every_command
 from seqopt.errors import InfeasibleError, PluginWarning, ProblemError, StepError
 from seqopt.sequence.rules import FreeRules
 from tests.commands import command

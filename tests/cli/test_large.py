@@ -18,7 +18,7 @@ from seqopt._cli.main import main
 from seqopt.graph.formulation import Finding
 from seqopt.plan import _answers as answers
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.workflow import _parse_size
+from seqopt.workflow import Search
 from tests.builders import ROOT, small_arch
 from tests.commands import beside_models
 
@@ -52,7 +52,7 @@ def contents(folder):
     ("text", "size"), [("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("1k", 1000)]
 )
 def test_sizes(text, size):
-    assert _parse_size(text) == size
+    assert Search(max_memory=text).memory == size
 
 
 def test_what_does_not_fit_is_refused_before(capsys, tmp_path):

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from seqopt._cli.arguments import parser
-from seqopt._registry import COMMANDS
+from seqopt._cli.registry import COMMANDS
 from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks, small_arch
 from tests.commands import command

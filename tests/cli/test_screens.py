@@ -11,10 +11,10 @@ import pytest
 from seqopt._cli import watcher
 from seqopt._cli.arguments import EXAMPLES, parser
 from seqopt._cli.main import main
+from seqopt._cli.registry import COMMANDS
 from seqopt._cli.signatures import signature_of
 from seqopt._cli.terminal import complain, show_text
 from seqopt._cli.watcher import Watcher
-from seqopt._registry import COMMANDS
 from seqopt.errors import ProblemError
 from seqopt.work.progress import Stage
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.assembly import bare_assembly, step_assembly
 from seqopt.contact.mortar import (
     DRY,
     EPOXY,
@@ -19,8 +19,7 @@ from seqopt.contact.mortar import (
 )
 from seqopt.engines.registry import AutoEngine
 from seqopt.errors import SceneError
-from seqopt.network.build import build_network
-from seqopt.network.network import GROUND
+from seqopt.network.network import GROUND, build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene_file import _parse_scene, dump_scene

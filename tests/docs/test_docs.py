@@ -12,7 +12,7 @@ import pytest
 import seqopt
 from experiments.harness.results import RESULTS, stored, two
 from experiments.placement.formulations import CUT, QUESTIONS
-from seqopt._registry import COMMANDS
+from seqopt._cli.registry import COMMANDS
 from seqopt.graph.formulation import exhibits, formulations
 from seqopt.study import STEP_TABLES, printed_steps
 from tests.browser import PLAIN, browsed, browses

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from seqopt._registry import COMMANDS
+from seqopt._cli.registry import COMMANDS
 from tests.builders import ROOT
 from tests.commands import command
 

@@ -19,7 +19,7 @@ from seqopt.engines.rigid._mixed import require_resistance, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder, grip_forces, well_conditioned
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError, SolverError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses.table import step_fields
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene

@@ -34,7 +34,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import _EVEN, _LARGE, ComplianceEngine, _cancels
 from seqopt.errors import MechanismError, SolverError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Load
 from tests.builders import (
     apart,

@@ -16,7 +16,7 @@ from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine, _can_compile, _extremes_in
 from seqopt.errors import GripError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses._grip_sets import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene

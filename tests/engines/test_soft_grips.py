@@ -13,7 +13,7 @@ from seqopt.engines.registry import engine_for, make_engine
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from tests.arms.scenes import compliances, with_joints
 from tests.builders import apart, block, six_bricks
 from tests.limit_scenes import softened

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.errors import FileError, SceneError, SceneWarning
+from seqopt.exchange._building import _touching_order
 from seqopt.exchange._compas_models import read_model
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import read_file
@@ -21,7 +22,7 @@ from seqopt.exchange._meshes import repair_shape
 from seqopt.exchange.contacts import face_ground, face_joint, flat_face, touching_faces
 from seqopt.exchange.imports import import_scene
 from seqopt.scene._checks import as_vectors
-from seqopt.scene.library.common import MASONRY, _touching_order
+from seqopt.scene.library.common import MASONRY
 from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism

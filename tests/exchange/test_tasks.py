@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt._files import write_text
+from seqopt._files import write_file
 from seqopt.arms._plan_postures import PlanPostures
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._content import Given
@@ -19,7 +19,7 @@ from seqopt.exchange._grip_frames import hold
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind, check_sequence
@@ -169,7 +169,7 @@ def sources(tmp_path):
 
     def write(name):
         path = tmp_path / f"{name}.json"
-        write_text(path, json.dumps(DOCUMENTS[name]))
+        write_file(path, json.dumps(DOCUMENTS[name]))
         return path, import_scene(path, given=Given(unit="m", density=2000.0))
 
     return write

@@ -24,7 +24,7 @@ from experiments.calibration.parts.barrel_vaults import (
 from experiments.harness.results import RESULTS
 from experiments.harness.scenes import barrel_vault
 from experiments.placement.parts.staged import spring_maps
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.study import printed
 
 pytestmark = pytest.mark.slow

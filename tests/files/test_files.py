@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from seqopt import _files as files
-from seqopt._files import read_text, require_apart, require_folder, write_folder, write_text
+from seqopt._files import read_text, require_apart, require_folder, write_file, write_folder
 from seqopt.errors import FileError
 from seqopt.work.progress import answered, ending
 
@@ -29,21 +29,21 @@ def test_a_device_stays_a_device(tmp_path):
         if path.parent == tmp_path:
             path.symlink_to("/dev/null")
         with pytest.raises(FileError, match="null: it is a device or pipe; name a regular file"):
-            write_text(path, "x")
+            write_file(path, "x")
     assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(FileError, match="device or pipe"):
-        write_text(tmp_path / "pipe", "x")
+        write_file(tmp_path / "pipe", "x")
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
 @pytest.mark.parametrize("length", [246, 255])
 def test_a_long_name_is_a_name(tmp_path, length):
     path = tmp_path / ("x" * length)
-    write_text(path, "text")
+    write_file(path, "text")
     assert read_text(path) == "text"
     with pytest.raises(FileError, match="too long"):
-        write_text(tmp_path / ("x" * 256), "text")
+        write_file(tmp_path / ("x" * 256), "text")
 
 
 @posix
@@ -80,7 +80,7 @@ def test_what_is_no_text_is_refused(tmp_path):
     with pytest.raises(FileError, match="not UTF-8 text"):
         read_text(tmp_path / "bytes")
     with pytest.raises(FileError, match="half a character"):
-        write_text(tmp_path / "half", "\ud800")
+        write_file(tmp_path / "half", "\ud800")
     with pytest.raises(FileError, match="null"):
         read_text(tmp_path / "a\0b")
     assert names(tmp_path) == ["bytes"]

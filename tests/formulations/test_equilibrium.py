@@ -21,7 +21,7 @@ from formulations.contact.limit_analysis import (
     _solve_cones,
     compile_equilibrium,
 )
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.states import build_states

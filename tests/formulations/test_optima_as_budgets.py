@@ -29,7 +29,7 @@ from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.space import Explorer
 from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule, plan_values
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import modified_sequential

@@ -11,7 +11,7 @@ import pytest
 
 import seqopt
 from formulations._search import Options, StopError, search_states
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError

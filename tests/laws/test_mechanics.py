@@ -18,7 +18,7 @@ from seqopt.errors import InfeasibleError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.states import build_states
 from seqopt.instances.compiled import compile_instance
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.quantities import responses_of
 from seqopt.scene.parts import Anywhere, Robot, Sphere

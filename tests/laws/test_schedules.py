@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 from experiments.stability.parts.blocks import ring, stack
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.arrays import skew
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, StepError
-from seqopt.network.build import build_network
-from seqopt.network.network import GROUND
+from seqopt.network.network import GROUND, build_network
 from seqopt.responses.quantities import CHOSEN_BY, lengths, responses_of
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.schedule import islands

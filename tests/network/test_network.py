@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import integers
 
-from seqopt.network import build
-from seqopt.network.build import build_network
-from seqopt.network.network import PartKind
+from seqopt.network import network as networks
+from seqopt.network.network import PartKind, build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import islands
 from tests.builders import running_bond
@@ -53,7 +52,7 @@ def test_the_graph_of_a_chain_has_closed_counts(count):
 
 @given(scene=walls() | arches(), seed=integers(0, 99))
 def test_no_array_depends_on_the_order_in_which_a_graph_is_made(scene, seed):
-    rng, made = np.random.default_rng(seed), build._double_cross
+    rng, made = np.random.default_rng(seed), networks._double_cross
 
     def shuffled(*given):
         graph, out = made(*given), nx.DiGraph()
@@ -64,7 +63,7 @@ def test_no_array_depends_on_the_order_in_which_a_graph_is_made(scene, seed):
                 add(*names, **{key: data[key] for key in rng.permutation([*data])})
         return out
 
-    with patch.object(build, "_double_cross", shuffled):
+    with patch.object(networks, "_double_cross", shuffled):
         other = build_network(scene)
     assert other == build_network(scene)
 

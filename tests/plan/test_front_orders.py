@@ -14,7 +14,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._spaces import TooManySetsError, order_rules
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import TIED
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan import front as fronts
 from seqopt.plan.front import find_front
 from seqopt.plan.solve import graph_of

@@ -16,7 +16,7 @@ from seqopt.errors import (
     SolverError,
 )
 from seqopt.graph.formulation import FormulationKind, Solution, find_formulation, formulations
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.requirements import Limit
 from seqopt.scene.arch import ArchShape, arch_scene

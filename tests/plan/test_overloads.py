@@ -20,7 +20,7 @@ from seqopt.plan._infeasible import payload_advice
 from seqopt.plan.solve import graph_of, solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
-from seqopt.sweep import sweep
+from seqopt.report.sweep import sweep
 from seqopt.workflow import Robust
 from tests.builders import Counting, small_arch, with_part
 from tests.layered import Costs

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.graph.formulation import formulation_names
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene

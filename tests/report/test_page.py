@@ -20,7 +20,7 @@ from seqopt._files import Page, csv_text
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.report import page
 from seqopt.report._pages import OVER, plan_page
 from seqopt.report._robots import Cell, arm_data

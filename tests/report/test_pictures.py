@@ -14,7 +14,7 @@ import seqopt
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import StepError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.report._gantt import gantt_picture
 from seqopt.report._style import look, looks, new_figure, picture_files, plain

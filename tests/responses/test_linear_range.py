@@ -12,7 +12,7 @@ from seqopt._cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses.quantities import RESPONSES, responses_of, support_forces, support_moments
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, support_columns
 from seqopt.scene.scene_file import _scene_by_words, save_scene

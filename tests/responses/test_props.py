@@ -17,7 +17,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
 from seqopt.network._mechanics import node_motion
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses.quantities import _excess_of
 from seqopt.scene.parts import Joint
 from seqopt.sequence.methods import cantilever, sequential

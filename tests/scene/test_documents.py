@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from seqopt._cli.main import main
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import bare_assembly
 from seqopt.errors import FileError, SceneError, SceneWarning
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import _find_warnings, _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes

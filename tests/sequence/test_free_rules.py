@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.sequence._space import free_space
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Step, StepKind

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import StepError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot, Sphere
@@ -292,7 +292,7 @@ def test_schedules_are_checked(loop25):
         loop25.fill((1, 2, 3))
     far = replace(loop25.steps[0], grips=(OpenGrip(0), OpenGrip(5), None))
     with pytest.raises(StepError, match="at most two neighboring"):
-        Schedule("x", loop25.scene, (far,), loop25.moves).require_pairs()
+        Schedule("x", loop25.scene, (far,), loop25.moves).names_robots(in_pairs=True)
 
 
 # fewer candidates: those near the newest bricks, never none, and the schedule says so

@@ -14,7 +14,7 @@ from seqopt.graph._spaces import among_orders
 from seqopt.graph.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.sequence.methods import SCHEDULES, sequential
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.schedule_file import (

@@ -7,7 +7,7 @@ import pytest
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.scene.scene_file import dump_scene
 from seqopt.stability import _steps, failure_map
 from seqopt.stability._steps import VerdictChain, each_verdict

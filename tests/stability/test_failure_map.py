@@ -5,7 +5,7 @@ import pytest
 
 import seqopt
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.exchange._content import Given

@@ -12,9 +12,9 @@ import pytest
 
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, bond_mortar
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.steps import Step, StepKind

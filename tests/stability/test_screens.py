@@ -12,10 +12,10 @@ from experiments.stability.parts.blocks import stack
 from formulations.contact.held_equilibrium import compile_held
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt import Prop
-from seqopt.contact.faces import PartialAssemblies, _prop_grips, step_assembly
+from seqopt.contact.assembly import PartialAssemblies, _prop_grips, step_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.errors import GripError, SceneError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, held_places
 from seqopt.stability.assessment import Verdict, assess, bonded, load_factors

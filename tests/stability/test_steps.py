@@ -11,11 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import PartialAssemblies, step_assembly
+from seqopt.contact.assembly import Assembly, PartialAssemblies, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.errors import ProblemError, SceneError, SceneWarning
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import METHODS

@@ -8,7 +8,7 @@ from itertools import count
 import numpy as np
 
 import seqopt
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import EPOXY, _find_curing
 from seqopt.judge._schedules import judge_schedule
 from seqopt.sequence.rules import FreeRules, with_robots

@@ -11,7 +11,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine, _build_system, _held_
 from seqopt.engines.interface import RIGID, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.responses.table import _grips_of
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import METHODS

@@ -11,7 +11,7 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import WallShape, chain, wall

@@ -19,7 +19,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.study import SOURCE, printed

@@ -24,8 +24,7 @@ from scipy.optimize import linprog
 
 from seqopt import Scene, Step, build_network
 from seqopt.arrays import Floats
-from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import failure_map

@@ -31,8 +31,7 @@ from seqopt.engines.rigid._mixed import (
 )
 from seqopt.errors import StepError
 from seqopt.network._mechanics import deformation, spring_stiffness
-from seqopt.network.build import network_of
-from seqopt.network.network import Network
+from seqopt.network.network import Network, network_of
 from seqopt.responses.table import _grips_of, response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene

@@ -20,7 +20,7 @@ from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.solve import pose
 from seqopt.problem.problem import Problem
 from seqopt.report.comparison import Comparison, compare

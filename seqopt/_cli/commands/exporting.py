@@ -10,7 +10,7 @@ from seqopt._cli.inputs import posture_trouble, read_steps
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
-from seqopt._files import write_text
+from seqopt._files import write_file
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._formats import formats
 from seqopt.exchange.exports import export
@@ -49,5 +49,5 @@ def run(asked: Annotated[Call, ("call", export)], *, out: File = None, progress:
     answer = Answer(facts, notes=notes, scene=scene)
     if out is None:
         return replace(answer, facts=facts | {"text": text}, data=text)
-    write_text(out, text)
+    write_file(out, text)
     return replace(answer, text=f"{said} written to {out}", written=(out,))

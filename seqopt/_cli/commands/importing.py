@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from seqopt._cli import remarks
 from seqopt._cli.answer import Answer
 from seqopt._cli.signatures import Call
-from seqopt._files import require_apart, write_text
+from seqopt._files import require_apart, write_file
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import readable
@@ -66,7 +66,7 @@ def run(
     if supports is not None:  # also if none are supports
         asked = replace(asked, supports=[key.strip() for key in supports.split(",") if key.strip()])
     scene = import_scene(file, format, asked)
-    write_text(out, dump_scene(scene))
+    write_file(out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
     said = "\n".join([*assumed, f"{remarks.size_line(scene)}; written to {out}"])
     return Answer({"assumed": assumed}, said, scene=scene, written=(out,))

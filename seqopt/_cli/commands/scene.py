@@ -12,8 +12,7 @@ from seqopt._cli.answer import Answer, scene_facts
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.network.network import Network, build_network
 from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene

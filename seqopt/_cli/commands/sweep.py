@@ -16,7 +16,7 @@ from seqopt._files import csv_text, make_folder, write_folder
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan.plan import Plan
 from seqopt.report._folders import figure_notes, picture_files
-from seqopt.sweep import MOST, spread, sweep
+from seqopt.report.sweep import MOST, spread, sweep
 from seqopt.work.progress import Tell
 from seqopt.workflow import optimize
 

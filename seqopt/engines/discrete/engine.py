@@ -28,7 +28,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import bare_assembly
 from seqopt.contact.mortar import EPOXY, BedStiffness, Mortar, face_quadrature, opening_maps
 from seqopt.contact.mortar import quadrature_stiffness as bed_stiffness
 from seqopt.engines.interface import FAR, Fields, GripCompliance, OpeningEngine, grip_springs

@@ -35,7 +35,7 @@ from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
 from seqopt.judge._schedules import plan_values
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum

@@ -1,19 +1,17 @@
-"""What generators and imports share: how stiff joints are, checked numbers, robots, orders."""
+"""What generators and imports share: how stiff joints are, checked numbers, robots."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from heapq import heapify, heappop, heappush
 
 import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene import _checks
-from seqopt.scene._checks import MOST_BRICKS, check, stiffness
+from seqopt.scene._checks import MOST_BRICKS, check, finite, kind_of, stiffness
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.parts import Brick, Robot
 
@@ -64,43 +62,14 @@ MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def _joint_width(where: str, value: float) -> float:
-    """Return the width of a joint, which may be none."""
-    return 0.0 if _checks.as_float(value) == 0 else _checks.positive(where, value, "m, or 0")
-
-
-a_law = partial(_checks.kind_of, kind=JointLaw)
+_joint_width = partial(finite, least=0.0, wanted="a positive number of m, or 0")
+a_law = partial(kind_of, kind=JointLaw)
 
 
 def _mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     """Return robots that reach everything, each of which can bear all bricks."""
     weight = STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
-
-
-def _touching_order(
-    rank: Sequence[float | tuple[float, ...]],
-    pairs: Iterable[tuple[int, int]],
-    starts: Iterable[int],
-) -> list[int]:
-    """Return an order in which every brick touches an earlier one, or the ground.
-
-    Of what can be placed, the lowest ``rank`` is next; what cannot be reached is left out.
-    """
-    beside: list[set[int]] = [set() for _ in rank]
-    for a, b in pairs:
-        beside[a].add(b)
-        beside[b].add(a)
-    seen, order = {*starts}, list[int]()
-    ready = [(rank[i], i) for i in seen]
-    heapify(ready)
-    while ready:
-        i = heappop(ready)[1]
-        order.append(i)
-        for j in beside[i] - seen:
-            seen.add(j)
-            heappush(ready, (rank[j], j))
-    return order
 
 
 def _few_enough(where: str, bricks: int) -> None:

@@ -10,9 +10,9 @@ from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.assembly import bare_assembly
 from seqopt.errors import SceneError
-from seqopt.network.build import build_network
+from seqopt.network.network import build_network
 from seqopt.scene.boxes import _boxes, _separations, box_corners
 from seqopt.scene.library import ArchForm, WallShape, arch, chain, wall
 from seqopt.scene.scene_file import (

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text, write_text
+from seqopt._files import csv_text, write_file
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SeqoptError, SolverError
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
@@ -122,7 +122,7 @@ def sweep(
     def done(case: tuple[str, Any], row: dict[str, Any]) -> None:
         rows[case[0]] = {**case[1], **row} if isinstance(case[1], Mapping) else row
         if path is not None:  # rows of other problems stay in the file
-            write_text(path, csv_text(_table(rows, [*dict.fromkeys([*names, *rows])]), DIGITS))
+            write_file(path, csv_text(_table(rows, [*dict.fromkeys([*names, *rows])]), DIGITS))
         if progress is not None:
             progress(Stage("problems", sum(name in rows for name in names) / len(names)))
 
