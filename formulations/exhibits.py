@@ -45,12 +45,14 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
+from formulations._search import Watching
 from formulations.flow import ACCURACY, WholeProgram, by_integers, conserved, unit_flow
-from formulations.on_graph import Choice, on_graph
+from formulations.on_graph import Choice, chosen, on_graph
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.formulation import Formulation, Watch
+from seqopt.graph.formulation import Formulation, Solution, Watch
 from seqopt.graph.graph import Graph, distances
+from seqopt.graph.states import States
 from seqopt.problem.problem import Aim
 
 
@@ -193,7 +195,12 @@ def _exhibit(
             raise ProblemError(f"{name}: it writes one {said} down alone; take overlap_mip")
         return by_integers(write)(graph, watch)
 
-    return on_graph(name, summary, choose, aim=aim)
+    def search(problem: States, watch: Watch, tell: Watching) -> Solution:
+        if problem.budgets or problem.totals:
+            raise ProblemError(f"{name}: it knows neither budgets nor totals; take overlap_mip")
+        return chosen(problem, choose, watch, tell, every=True)  # whose levels are whole
+
+    return on_graph(name, summary, choose, aim=aim, search=search)
 
 
 ASSIGNMENT_TIGHT = _exhibit("assignment_tight", "assignment, tight links", Aim.SUM, _tight)

@@ -11,9 +11,9 @@ With moves :math:`a = (u, v)` that take :math:`c_a` of a goal and :math:`a_{ba}`
    & y \ge 0 \quad \text{or} \quad y \in \{0, 1\} .
 
 Of the open grips of a schedule a move is a pair of candidates, and costs its later candidate and
-the step that the two share; of a free schedule it is a step. HiGHS solves it. ``overlap_lp`` and
-``flow_lp`` take :math:`y \ge 0`. Without budgets the matrix is totally unimodular: the optimum is a
-path. With the multipliers :math:`\pi_s` of its rows, 0 at ends, paths of moves with :math:`c_a =
+the step that the two share; of a free schedule it is a step. HiGHS solves it. ``overlap_lp`` takes
+:math:`y \ge 0`. Without budgets the matrix is totally unimodular: the optimum is a path. With the
+multipliers :math:`\pi_s` of its rows, 0 at ends, paths of moves with :math:`c_a =
 \pi_u - \pi_v` are the best ones, and only these are left for the next goal. The largest amount on a
 path is no linear function of :math:`y`. Of a peak therefore the least :math:`t` is found by
 bisection for which
@@ -26,7 +26,7 @@ has a solution. With budgets the value is a bound, the duals of their rows are t
 and the path that the largest flow follows need not be the best; where it exceeds a budget, one that
 took no search is taken.
 
-``overlap_mip`` and ``flow_mip`` take :math:`y \in \{0, 1\}`: exact, with budgets. A peak is
+``overlap_mip`` takes :math:`y \in \{0, 1\}`: exact, with budgets. A peak is
 
 .. math::
 
@@ -108,7 +108,7 @@ def unit_flow(graph: Graph, goal: int = 0) -> Flow:
     if len(moves) > MOST_ARCS:
         raise ProblemError(
             f"a program of {shape[1]:,} moves between {shape[0]:,} states is too large (at most "
-            f"{MOST_ARCS:,} moves are written); take path_dp, or let fewer candidates in"
+            f"{MOST_ARCS:,} moves are written); take overlap_dp, or let fewer candidates in"
         )
     rows = np.concatenate([number[graph.source], number[graph.target[inner]]])
     signs = np.repeat([1.0, -1.0], [len(moves), inner.sum()])
@@ -325,8 +325,4 @@ OVERLAP_MIP = on_graph(
     by_integers(_whole),
     aim=Aim.SUM,
     takes_budgets=True,
-)
-FLOW_LP = on_graph("flow_lp", "a unit flow of states, linear programs", _linear)
-FLOW_MIP = on_graph(
-    "flow_mip", "a whole unit flow of states, integer programs", by_integers(_whole)
 )

@@ -32,7 +32,7 @@ from formulations._search import (
     watched,
 )
 from seqopt.arrays import Floats, Ints, Terse
-from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, within_budgets
 from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
 from seqopt.graph._spaces import build_space, explore
@@ -47,6 +47,7 @@ from seqopt.graph.graph import (
     _target_sums,
     contracted,
     distances,
+    is_path,
     lexicographic,
     moves_along,
     path_values,
@@ -168,15 +169,22 @@ def best_total(
 
 
 def chosen(
-    problem: States, choose: Choose, watch: Watch, tell: Watching, *, alone: bool = False
+    problem: States,
+    choose: Choose,
+    watch: Watch,
+    tell: Watching,
+    *,
+    alone: bool = False,
+    every: bool = False,
 ) -> Solution:
     """Return the plan of a choice; where time was over, the better one of it and the incumbent.
 
-    ``alone``: whether it is charged as of `Graph.alone`, where grips are open.
+    ``alone``: whether it is charged as of `Graph.alone`, where grips are open; ``every``: whether
+    it chooses among all states, not those alone that are as good as a first plan.
     """
     first = None
     try:
-        first = narrow(problem, WIDTH, tell)
+        first = None if every else narrow(problem, WIDTH, tell)
         wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
         if not wide.whole:
             raise wide.without_plan("no plan is allowed")
@@ -199,7 +207,8 @@ def chosen(
     if not best.path or (first and best.stopped and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
     known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
-    bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
+    known = (*known, *found.objective[graph.goals :])
+    bound = tuple(map(_without_rounding, found.objective, known))
     return replace(
         found,
         bound=bound,
@@ -303,12 +312,7 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     ``instance``: has ``asked``, the graph of its goals and caps, and ``goals``.
     """
     graph, goal = instance.asked, instance.goals[0]
-    if goal.kind == TAIL:
-        found = _least_tail(graph, goal, choose, watch)
-    else:
-        found = choose(graph, watch)
-        if not found.path and not found.stopped:
-            raise InfeasibleError("no path leads to an end")
+    found = _least_tail(graph, goal, choose, watch) if goal.kind == TAIL else choose(graph, watch)
     if not found.path:
         raise TimeUpError("no path was found yet; give more")
     values = path_values(graph, found.path)[: graph.goals]
@@ -322,12 +326,17 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     return Solution(
         states,
         values,
-        tuple(v if v < b <= tied(v) else b for v, b in zip(values, bounds, strict=True)),
+        tuple(map(_without_rounding, values, bounds)),
         (),
         *told,
         trace=watch.trace,
         compile_seconds=found.compile_seconds,
     )
+
+
+def _without_rounding(value: float, bound: float) -> float:
+    """Return a lower bound that is no larger than its value by rounding alone."""
+    return value if value < bound <= tied(value) else bound
 
 
 def _least_tail(graph: Graph, goal: _Target, choose: Choose, watch: Watch) -> Choice:
@@ -378,7 +387,15 @@ class OnGraph(Terse):
         watch.memory = min(watch.memory, max_memory)
 
         def choose(graph: Graph, watch: Watch) -> Choice:
-            return self.choose(graph, watch, **options)
+            found = self.choose(graph, watch, **options)
+            if not (found.path or found.stopped or graph.ends[0]):
+                raise InfeasibleError("no path leads to an end")
+            if found.path and not is_path(graph, found.path):
+                raise SolverError(
+                    f"formulation {self.name}: its path does not lead along moves of the graph "
+                    "from the start to an end"
+                )
+            return found
 
         if not has_scene(problem):
             if problem.caps and not self.takes_budgets:

@@ -15,7 +15,7 @@ from seqopt._registry import Later, offered
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.graph.formulation import Formulation, Run, as_formulation, find_formulation
+from seqopt.graph.formulation import Formulation, Run, as_formulation
 from seqopt.network.network import Network, build_network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import _solve_run, default_formulation, pose
@@ -240,9 +240,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         equations-2-3, with --aim, --stands or --schedule free worst-ratio.
     formulation : str, optional
         Which mathematical program chooses (default: overlap_dp, which is exact and the fastest,
-        labels with budgets, minimax with worst-peak over scenarios, scenario_search with other
-        aims over scenarios; schedule_search with an aim, ``stands`` or a free schedule,
-        makespan_labels where a makespan counts, order_search where the order is sought).
+        labels with budgets, minimax with worst-peak over scenarios; schedule_search with an aim,
+        ``stands`` or a free schedule, makespan_labels where a makespan counts, order_search where
+        the order is sought).
     engine : str
         What computes responses (default: {default}): compliance: exactly rigid bricks, fast; frame:
         stiff bars, a slow independent check; discrete: joints that open and slip; auto: compliance,
@@ -345,8 +345,6 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     limits: Sequence[Any] = parse_limits(asked["limits"], scene)
     states = asked["aim"] or stands or sought or not moves.has_pairs
     states = states or any(isinstance(each, Filter) for each in limits)
-    if not states and asked["formulation"] is not None:
-        states = find_formulation(asked["formulation"]).of_states
     over: RobustAim | str = WORST_PEAK if robust is None else robust.measure
     usual, minimized = DEFAULTS[FREE if states else "any other"]
     minimized = minimized if str(over) == str(WORST_PEAK) else ""  # totals are of sums

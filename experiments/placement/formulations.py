@@ -87,7 +87,7 @@ ENDINGS: dict[type[BaseException], str] = {
     KeyboardInterrupt: "out of time",
 }  # the first that fits
 PLANS = ("optimal", "feasible")  # how a row ended that goes on to larger arches
-PROGRAMS = ("overlap_mip", "flow_mip", *exhibits())
+PROGRAMS = ("overlap_mip", *exhibits())
 Cell = tuple[str, int, str, float]  # the key of a row, and a number: a budget, or where to cut
 
 

@@ -152,7 +152,7 @@ def measured(graph: States, sets: Mapping[str, Sequence[LayeredCosts]]) -> dict[
 
 
 def solved(graph: States) -> Plan:
-    return solve(graph, "scenario_search" if graph.totals else "minimax")
+    return solve(graph, "overlap_dp" if graph.totals else "minimax")
 
 
 def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:

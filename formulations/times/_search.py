@@ -98,7 +98,7 @@ def of_instance(instance: Any, least: Least, watch: Watch) -> Solution:
     """Return the best path through an instance, its states the numbers of nodes."""
     timed = instance.timed if instance.asks_time else None
     if timed is None:
-        raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
+        raise ProblemError(f"instance {instance.name}: no times are asked; take overlap_dp")
     own = {PEAK: MINMAX, TIME: makespan}
     aims = tuple(own.get(goal.kind, SUM) for goal in instance.goals)
     caps = [makespan if cap.column is None else SUM for cap in instance.caps]

@@ -1,6 +1,6 @@
 r"""A lower bound of the makespan, by an integer unit flow that shares the robots' time: a bound.
 
-The flow of `flow_mip`, :math:`y_a \in \{0, 1\}` for every move, with one more variable: the
+The flow of `overlap_mip`, :math:`y_a \in \{0, 1\}` for every move, with one more variable: the
 makespan :math:`C` is no less than what all steps take one after the other, nor than the mean time
 of the robots of a kind :math:`K`, who prepare (:math:`p_a`), act and hold (:math:`d_a`),
 

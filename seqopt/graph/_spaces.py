@@ -5,10 +5,12 @@ The best margin of stability with which a plan exists is found by bisection.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +34,7 @@ from seqopt.stability.standing import Standing, slack
 
 @dataclass(frozen=True)
 class _PosedSpace(Space):
-    """Goals of moves, which take a column each: whether they are regrips, and how far robots go, m.
+    """States of a problem; moves take whether they are regrips, and how far robots go, m.
 
     Where totals over scenarios count, a column for every scenario stands in the place of the goal.
     ``regrips``: whether robots may take grips on bricks that stand; ``standing``: whether it is
@@ -42,6 +44,10 @@ class _PosedSpace(Space):
     problem: States
     regrips: bool = True
     standing: bool = False
+
+    @abstractmethod
+    def at(self, part: Any) -> tuple[int, States]:
+        """Return the level of a part, and the problem that its states are of."""
 
     @property
     def peaks(self) -> tuple[bool, ...]:
@@ -54,6 +60,29 @@ class _PosedSpace(Space):
         """Whether values may be lower bounds, from some of the scenarios."""
         return bool(self.problem.each) and not self.problem.totals
 
+    def codes(self, part: Any, states: Ints) -> Ints:
+        return self.at(part)[1].space.codes(states)
+
+    def within(self, part: Any, states: Ints) -> Moves:
+        level, own = self.at(part)
+        return _joined(own.space.within(level, states, regrips=self.regrips), states)
+
+    def values(
+        self, part: Any, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        level, own = self.at(part)
+        if not own.totals:
+            if self.standing:
+                return own.standing_values(level, states, most=most)
+            return own.values(level, states, rough=rough, most=most)
+        out, rows = np.full((len(states), len(self.peaks)), np.inf), np.arange(len(states))
+        for k, one in enumerate(own.each):  # a column each; no more is asked of what one excludes
+            asked = one.standing_values if self.standing else one.values
+            found, allowed = asked(level, states[rows])
+            out[rows, k] = found[:, 0]
+            rows = rows[allowed]
+        return out, np.isin(np.arange(len(states)), rows)
+
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         if self.problem.totals:
             return values
@@ -62,6 +91,24 @@ class _PosedSpace(Space):
             if goal.moves is not None:
                 out[:, k] = goal.value(moves)
         return out
+
+    def to_go(self, part: Any, states: Ints) -> Floats | None:
+        level, own = self.at(part)
+        if own.goals[1:2] != (STEPS,) or own.demands or own.budgets:
+            return None
+        return own.space.steps_to_go(level, states)
+
+    def ended(self, part: Any, states: Ints) -> Bools:
+        return self.at(part)[1].space.ended(states)
+
+    def stand(self, part: Any, states: Ints) -> Bools:
+        level, own = self.at(part)
+        asked = own.demands and not self.standing
+        return own.stand(level, states) if asked else super().stand(part, states)
+
+    def known(self, part: Any, states: Ints) -> Ints:
+        level, own = self.at(part)
+        return own.recalled(level, states)
 
 
 @dataclass(frozen=True)
@@ -72,6 +119,9 @@ class StateSpace(_PosedSpace):
     """
 
     order: Order = ()
+
+    def at(self, part: int) -> tuple[int, States]:
+        return part, self.problem
 
     @property
     def levels(self) -> int:
@@ -84,67 +134,19 @@ class StateSpace(_PosedSpace):
     def start(self) -> tuple[int, Ints]:
         return self.first, self.problem.space.start()
 
-    def codes(self, part: int, states: Ints) -> Ints:
-        return self.problem.space.codes(states)
-
-    def within(self, part: int, states: Ints) -> Moves:
-        return _joined(self.problem.space.within(part, states, regrips=self.regrips), states)
-
     def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
-        rows = self.able(part, states)
-        moves = self.placed(part, states[rows])
+        space = self.problem.space
+        rows = np.flatnonzero(space.may_place(part, states))
+        moves = _joined(space.onward(part, states[rows]), states[rows])
         yield part + 1, moves._replace(source=rows[moves.source])
-
-    def able(self, part: int, states: Ints) -> Ints:
-        """Return the rows of states from which a brick may be placed."""
-        return np.flatnonzero(self.problem.space.may_place(part, states))
-
-    def placed(self, level: int, states: Ints) -> Moves:
-        """Return the moves from a level to the next."""
-        return _joined(self.problem.space.onward(level, states), states)
 
     @property
     def complete(self) -> bool:
         return self.regrips and not self.order
 
-    def values(
-        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
-    ) -> tuple[Floats, Bools]:
-        if self.problem.totals:
-            return self._totals(part, states)
-        if self.standing:
-            return self.problem.standing_values(part, states, most=most)
-        return self.problem.values(part, states, rough=rough, most=most)
-
-    def _totals(self, level: int, states: Ints) -> tuple[Floats, Bools]:
-        """Return values of the goal by scenario, (n, S), and which states are feasible in all."""
-        out = np.full((len(states), len(self.peaks)), np.inf)
-        rows = np.arange(len(states))
-        for k, problem in enumerate(self.problem.each):
-            asked = problem.standing_values if self.standing else problem.values
-            found, allowed = asked(level, states[rows])
-            out[rows, k] = found[:, 0]
-            rows = rows[allowed]
-        return out, np.isin(np.arange(len(states)), rows)
-
-    def to_go(self, part: int, states: Ints) -> Floats | None:
-        if self.problem.goals[1:2] != (STEPS,) or self.problem.demands or self.problem.budgets:
-            return None
-        return self.problem.space.steps_to_go(part, states)
-
-    def ended(self, part: int, states: Ints) -> Bools:
-        return self.problem.space.ended(states)
-
-    def stand(self, part: int, states: Ints) -> Bools:
-        asked = self.problem.demands and not self.standing
-        return self.problem.stand(part, states) if asked else super().stand(part, states)
-
-    def known(self, part: int, states: Ints) -> Ints:
-        return self.problem.recalled(part, states)
-
-    def schedule(self, part: int, asked: States) -> tuple[int, States]:
-        """Return the level of a part, and the given problem, of which its states are."""
-        return part, asked
+    def demanding(self, part: int, asked: States) -> States:
+        """Return the given problem, of which the states of a part are."""
+        return asked
 
     def path(self, found: Found) -> tuple[Order, tuple[tuple[int, ...], ...]]:
         return self.order, super().path(found)[1]
@@ -271,7 +273,7 @@ class OrderSpace(_PosedSpace):
     """
 
     most: int = MOST_PARTS
-    parts: dict[Part, StateSpace] = field(default_factory=dict)
+    parts: dict[Part, States] = field(default_factory=dict)
 
     @cached_property
     def _here(self) -> States:
@@ -281,81 +283,7 @@ class OrderSpace(_PosedSpace):
     def _rules(self) -> OrderRules:
         return order_rules(self.problem)
 
-    @property
-    def first(self) -> int:
-        return len(self._rules.stands)
-
-    @property
-    def levels(self) -> int:
-        return len(self._rules.scene.bricks)
-
-    def start(self) -> tuple[Part, Ints]:
-        stands = self._rules.stands
-        part = (frozenset(stands), stands[-1] if stands else 0)
-        return part, self._of(part).start()[1]
-
-    def codes(self, part: Part, states: Ints) -> Ints:
-        return self._of(part).codes(len(part[0]), states)
-
-    def within(self, part: Part, states: Ints) -> Moves:
-        return self._of(part).within(len(part[0]), states)
-
-    def onward(self, part: Part, states: Ints) -> Iterator[tuple[Part, Moves]]:
-        old = self._of(part)
-        rows = old.able(len(part[0]), states)
-        for brick in self._rules.next_bricks(part[0]):
-            to = (part[0] | {brick}, brick)
-            new = self._of(to)
-            own = _renumbered(old.problem, new.problem, states[rows])
-            moves = new.placed(len(part[0]), own)
-            yield to, moves._replace(source=rows[moves.source])
-
-    @property
-    def complete(self) -> bool:
-        return self.regrips
-
-    def values(self, part: Part, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        return self._of(part).values(len(part[0]), states, rough=rough, most=most)
-
-    def to_go(self, part: Part, states: Ints) -> Floats | None:
-        return self._of(part).to_go(len(part[0]), states)
-
-    def ended(self, part: Part, states: Ints) -> Bools:
-        return self._of(part).ended(len(part[0]), states)
-
-    def stand(self, part: Part, states: Ints) -> Bools:
-        return self._of(part).stand(len(part[0]), states)
-
-    def known(self, part: Part, states: Ints) -> Ints:
-        return self._of(part).known(len(part[0]), states)
-
-    def schedule(self, part: Part, asked: States) -> tuple[int, States]:
-        """Return how many bricks a part has, and its states with the demands of a problem."""
-        own = self._of(part).problem
-        found = replace(own, standing=asked.standing, settled=asked.settled)
-        found.share_proofs(own)
-        return len(part[0]), found
-
-    def path(self, found: Found) -> tuple[Order, tuple[tuple[int, ...], ...]]:
-        newest = (part[1] for _, part, _ in found)
-        order = tuple(dict.fromkeys((*self._rules.stands, *newest)))
-        new, steps = self._here.at(order), list[tuple[int, ...]]()
-        for level, part, state in found:
-            row = _renumbered(self._of(part).problem, new, state[None])[0]
-            steps.append((level, *row.tolist()))
-        return order, tuple(steps)
-
-    @property
-    def effort(self) -> tuple[int, int]:
-        return len(self.parts) - 1, sum(space.problem.models for space in self.parts.values())
-
-    def rows(self, part: Part, states: Ints) -> Ints:
-        """Return labels of states: the level, the newest brick, and the place of each grip."""
-        held = states[:, : self._here.space.robots].astype(np.int64)
-        own = np.array([[len(part[0]), part[1]]])
-        return np.column_stack([np.repeat(own, len(held), axis=0), held])
-
-    def _of(self, part: Part) -> StateSpace:
+    def at(self, part: Part) -> tuple[int, States]:
         """Return the states of an order that begins with a set, its newest brick last."""
         if part not in self.parts:
             if len(self.parts) > self.most:
@@ -368,8 +296,61 @@ class OrderSpace(_PosedSpace):
             stand = [name for name in self._rules.stands if name in first]
             newest = (part[1],) if part[0] else ()
             order = tuple(dict.fromkeys((*stand, *first, *newest, *own)))
-            self.parts[part] = StateSpace(self._here.at(order), self.regrips, self.standing)
-        return self.parts[part]
+            self.parts[part] = self._here.at(order)
+        return len(part[0]), self.parts[part]
+
+    @property
+    def first(self) -> int:
+        return len(self._rules.stands)
+
+    @property
+    def levels(self) -> int:
+        return len(self._rules.scene.bricks)
+
+    def start(self) -> tuple[Part, Ints]:
+        stands = self._rules.stands
+        part = (frozenset(stands), stands[-1] if stands else 0)
+        return part, self.at(part)[1].space.start()
+
+    def onward(self, part: Part, states: Ints) -> Iterator[tuple[Part, Moves]]:
+        level, old = self.at(part)
+        rows = np.flatnonzero(old.space.may_place(level, states))
+        for brick in self._rules.next_bricks(part[0]):
+            to = (part[0] | {brick}, brick)
+            _, new = self.at(to)
+            own = _renumbered(old, new, states[rows])
+            moves = _joined(new.space.onward(level, own), own)
+            yield to, moves._replace(source=rows[moves.source])
+
+    @property
+    def complete(self) -> bool:
+        return self.regrips
+
+    def demanding(self, part: Part, asked: States) -> States:
+        """Return the states of a part with the demands of a problem."""
+        _, own = self.at(part)
+        found = replace(own, standing=asked.standing, settled=asked.settled)
+        found.share_proofs(own)
+        return found
+
+    def path(self, found: Found) -> tuple[Order, tuple[tuple[int, ...], ...]]:
+        newest = (part[1] for _, part, _ in found)
+        order = tuple(dict.fromkeys((*self._rules.stands, *newest)))
+        new, steps = self._here.at(order), list[tuple[int, ...]]()
+        for level, part, state in found:
+            row = _renumbered(self.at(part)[1], new, state[None])[0]
+            steps.append((level, *row.tolist()))
+        return order, tuple(steps)
+
+    @property
+    def effort(self) -> tuple[int, int]:
+        return len(self.parts) - 1, sum(own.models for own in self.parts.values())
+
+    def rows(self, part: Part, states: Ints) -> Ints:
+        """Return labels of states: the level, the newest brick, and the place of each grip."""
+        held = states[:, : self._here.space.robots].astype(np.int64)
+        own = np.array([[len(part[0]), part[1]]])
+        return np.column_stack([np.repeat(own, len(held), axis=0), held])
 
 
 def _renumbered(old: States, new: States, states: Ints) -> Ints:
@@ -496,7 +477,7 @@ class StandingLook:
         self._found = Explorer(self._space, tell=tell)
         self._found.rise()
         self.found: Ordered = ((), ())
-        self._schedules = dict[tuple[object, ...], tuple[int, States]]()
+        self._demanding = dict[tuple[object, ...], States]()
         self._visited = self._found.graph()
         self._graph, self._states = self._visited
         counts = [len(rows) for *_, rows in self._states]
@@ -558,9 +539,9 @@ class StandingLook:
         """Return the level of states, the problem that they are of with its demands, and them."""
         _, key, states = self._states[part]
         own = (part, asked.standing, asked.settled)
-        if own not in self._schedules:
-            self._schedules[own] = self._space.schedule(key, asked)
-        return *self._schedules[own], states[rows - self._starts[part]]
+        if own not in self._demanding:
+            self._demanding[own] = self._space.demanding(key, asked)
+        return self._space.at(key)[0], self._demanding[own], states[rows - self._starts[part]]
 
 
 def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:

@@ -22,6 +22,12 @@ from seqopt.work.progress import Clock
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"
 WATCH = "watch"  # the name by which a formulation takes a watch
+ALIASES = {
+    "path_dp": "overlap_dp",
+    "scenario_search": "overlap_dp",
+    "flow_lp": "overlap_lp",
+    "flow_mip": "overlap_mip",
+}  # names that each had where it was written twice
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -245,11 +251,6 @@ class Formulation:
     def _for(self) -> str:
         return f"least {LEAST[self.aim]} of the costs" if self.aim else QUESTIONS[self.answers[0]]
 
-    @property
-    def of_states(self) -> bool:
-        """Whether it chooses states of a build even where candidates of moves could be chosen."""
-        return self.aim is None and bool({"goals", "time"} & {*self.answers})
-
     def fits(self, *questions: str) -> bool:
         """Return whether it answers some `QUESTIONS`."""
         return {*questions} <= {*self.answers, *(["costs"] if self.aim else [])}
@@ -374,10 +375,11 @@ def _load(entry: EntryPoint) -> Formulation:
 def find_formulation(name: str) -> Formulation:
     """Return a formulation by name.
 
-    ``name``: one of `formulation_names`, or of an exhibit. Raises `ProblemError` if there is none
-    of that name; the message lists those there are.
+    ``name``: one of `formulation_names`, of an exhibit, or of `ALIASES`. Raises `ProblemError`
+    if there is none of that name; the message lists those there are.
     """
     found, known = plugins(EXHIBITS) | plugins(GROUP), formulation_names()
+    name = name if name in found else ALIASES.get(name, name)
     if name not in found:
         why = f"does not exist{did_you_mean(name, known)}"
         raise ProblemError(f"formulation {name!r} {why}; give one of {', '.join(known)}")

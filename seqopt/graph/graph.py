@@ -374,6 +374,17 @@ def moves_along(graph: Graph, path: Sequence[int]) -> Ints:
     return np.asarray(np.searchsorted(codes, states[:-1] * graph.states + states[1:]))
 
 
+def is_path(graph: Graph, path: Sequence[int]) -> bool:
+    """Return whether moves lead along states, the start left out, to an end."""
+    states = np.asarray(path)
+    if states.dtype.kind not in "iu" or states.ndim != 1:
+        return False
+    inside = ((states >= 0) & (states < graph.states)).all()
+    codes = graph.source.astype(np.int64) * graph.states + graph.target
+    taken = np.concatenate([[0], states[:-1]]) * graph.states + states
+    return bool(inside and np.isin(taken, codes).all() and graph.ends[states[-1]])
+
+
 def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
     """Return the value of every column of a path: its sum, or its largest amount.
 

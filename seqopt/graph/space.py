@@ -140,7 +140,7 @@ class Space(ABC):
 NEW, PENDING, OPEN, CLOSED = range(4)  # of a state: above the threshold, visited, not allowed
 ARRAYS = ("values", "mark", "exact", "floor", "spent", "to_go")  # of a part, a row for every state
 FEW = 8  # states that a dive visits at once at first
-TURNS = 5  # of a dive, over the levels; with 2 it misses plans, and far more states are visited
+STUCK = 1.0  # turns of a dive without a higher level, over the levels; successes need up to 0.6
 BAND = 1e-5  # share of a value within which six digits do not decide
 Valued = Callable[[Ints], tuple[Floats, Bools, float]]
 """Returns values, feasibility, and from which value of the first goal on they are lower bounds."""
@@ -307,12 +307,11 @@ class Explorer:
         """Visit states up to a threshold, the highest level first, until one may end a build.
 
         Few are visited at a time while that leads on, more and more where it does not; after some
-        turns it gives up, since whole levels are visited in larger batches.
+        turns without a higher level it gives up, since whole levels are visited in larger batches.
         """
         self._begin_pass(threshold, below, most)
-        level, deepest, few = self.space.levels, -1, FEW
-        turns = int(TURNS * self.space.levels)
-        while not self.whole and turns:
+        level, highest, few, stuck = self.space.levels, -1, FEW, 0
+        while not self.whole and stuck < STUCK * self.space.levels:
             parts = self._parts[level].items()
             eligible = ((key, part, self._eligible(key, part)) for key, part in parts)
             found = next((each for each in eligible if len(each[2])), None)
@@ -321,15 +320,14 @@ class Explorer:
                 if level < self.space.first:
                     return False
                 continue
-            turns -= 1
             key, part, fresh = found
             fresh = fresh[np.argsort(part.values[fresh, 0], kind="stable")[:few]]
             self.level = level
             self._open(level, key, part, fresh)
             self._go_on(level, key, part, fresh)
             self.tell(self)
-            few = FEW if level > deepest else 4 * few
-            deepest = max(deepest, level)
+            few, stuck = (FEW, 0) if level > highest else (4 * few, stuck + 1)
+            highest = max(highest, level)
             level = min(level + 1, self.space.levels)
         return self.whole
 

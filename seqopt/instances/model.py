@@ -127,7 +127,7 @@ class Instance(FrozenValue, Given, Shown):
             found = [name for name in found if every[name].aim is not Aim.PEAK]
         if self.caps:
             found = [name for name in found if every[name].takes_budgets]
-        usual = ("makespan_labels", "labels" if self.caps else "path_dp", "schedule_search")
+        usual = ("makespan_labels", "labels" if self.caps else "overlap_dp", "schedule_search")
         first = next(name for name in usual if name in found)
         return (first, *(name for name in found if name != first))
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph._spaces import order_rules
 from seqopt.graph.formulation import LabelProof, Solution
 from seqopt.graph.graph import (
     FAILS,
@@ -34,7 +33,7 @@ from seqopt.graph.graph import (
     reached,
 )
 from seqopt.graph.states import States
-from seqopt.judge._rule_moves import RuleTables, Transitions
+from seqopt.judge._rule_moves import RuleTables, Transitions, may_follow
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, places
 from seqopt.judge.arithmetic import (
     Book,
@@ -48,6 +47,7 @@ from seqopt.judge.arithmetic import (
 from seqopt.judge.certificate import _twin_of
 from seqopt.network.network import build_network
 from seqopt.problem.amounts import NONE
+from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence.rules import _RuleBook
@@ -94,10 +94,10 @@ class AllOrders(OneSchedule):
 
     def __init__(self, problem: States) -> None:
         self._problem = replace(problem, resources=problem.resources.alone())
-        self._rules, scene = order_rules(problem), problem.network.scene
+        self._scene = scene = problem.network.scene
         super().__init__(replace(self._problem, orders=None))
         self._known = dict[Key, StateEvaluator]()
-        stands = self._rules.stands
+        stands = scene.build_order[: problem.free_rules.span(scene)[0]]
         self.first = frozenset(stands), stands[-1] if stands else 0
         self.levels = range(max(1, len(stands)), len(scene.bricks) + 1)
         self._nodes = {brick.name: brick.nodes for brick in scene.bricks}
@@ -117,11 +117,12 @@ class AllOrders(OneSchedule):
 
     def onward(self, part: Key, found: Reachable) -> Iterator[tuple[Key, Transitions]]:
         problem, (stand, _) = self._problem, part
-        own = self.renumbered(part, found.states)
-        for brick in self._rules.next_bricks(stand) if len(own) else ():
+        own, among = self.renumbered(part, found.states), problem.orders or Orders.TIED
+        follow = (n for n in self._scene.build_order if may_follow(self._scene, among, stand, n))
+        for brick in follow if len(own) else ():
             order = self._order(part, brick)
             worlds = tuple(in_order(scene, order) for scene in problem.worlds)
-            book = _RuleBook(build_network(self._rules.scene, order), problem.free_rules, worlds)
+            book = _RuleBook(build_network(self._scene, order), problem.free_rules, worlds)
             tables = RuleTables(book, [], parks=problem.parks)
             rows = self._renumbered(order, own, back=True)
             for move in tables.successors(len(stand), rows):
@@ -133,7 +134,7 @@ class AllOrders(OneSchedule):
         """Return states with places in the scene's own order for those in another, or back."""
         place = np.array([0, *(self._place[n] for name in order for n in self._nodes[name])])
         place = np.argsort(place) if back else place
-        robots = len(self._problem.free_rules.team(self._rules.scene))
+        robots = len(self._problem.free_rules.team(self._scene))
         out = states.copy()
         held = states[:, :robots]  # negative where a free robot was last
         out[:, :robots] = np.sign(held) * place[np.abs(held)]
@@ -141,7 +142,7 @@ class AllOrders(OneSchedule):
 
     def _order(self, key: Key, following: int | None = None) -> Order:
         """Return an order that begins with a set, its newest brick last, and maybe another one."""
-        own, (stand, newest) = self._rules.scene.build_order, key
+        own, (stand, newest) = self._scene.build_order, key
         first = [name for name in own if name in stand and name != newest]
         last = [newest] if stand else []
         last += [] if following is None else [following]

@@ -17,6 +17,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.problem.problem import Orders
 from seqopt.scene.scene import Scene, _posture_rules
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload, _RuleBook, _unbearable
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
@@ -451,6 +452,22 @@ class ScheduleTables(_Tables):
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, robots) end the build: all after the last step."""
         return np.full(len(states), level == self.last)
+
+
+def may_follow(scene: Scene, among: Orders, stand: Collection[int], brick: int) -> bool:
+    """Return whether orders allow that a brick is placed next, by names, the others standing."""
+    if brick in stand or among is Orders.ANY:
+        return brick not in stand
+    for ground in scene.grounds:
+        closing = ground.brick if ground.closes_with is None else ground.closes_with
+        if ground.brick == brick and (closing == brick or closing in stand):
+            return True
+    return any(
+        brick in joint.bricks
+        and not {*joint.bricks}.isdisjoint(stand)
+        and max(*joint.translational_stiffness, *joint.rotational_stiffness) > 0
+        for joint in scene.joints
+    )
 
 
 def check_free(

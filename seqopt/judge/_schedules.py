@@ -23,11 +23,10 @@ from seqopt._registry import Later
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine, Fields, Want, linear_limit
 from seqopt.errors import SolverError, StepError
-from seqopt.graph._spaces import order_rules
 from seqopt.graph.formulation import Solution
 from seqopt.graph.states import States
 from seqopt.judge._proof import Hint, Proof, TooManyPartsError
-from seqopt.judge._rule_moves import check_free
+from seqopt.judge._rule_moves import check_free, may_follow
 from seqopt.judge._states import StateEvaluator, depends_on_robots, largest_load, props_that_hold
 from seqopt.judge.arithmetic import limit_below
 from seqopt.judge.certificate import TOLERANCE, Basis, Certificate, _own_values, _twin_of, exceeds
@@ -84,7 +83,7 @@ def judge_schedule(
     quick = problem.rules.has_pairs and not problem.demands
     quick &= bool(selection.prices) or not (problem.budgets or problem.totals)
     is_claimed = not proves and (bool(selection.stopped and not quick) or by_labels)
-    bounds: Bounds = (-np.inf,) * len(problem.goals)  # they are claimed alone
+    bounds: Bounds = (-np.inf,) * max(1, aims)  # they are claimed alone
     with suppress(TooManyPartsError):
         if not is_claimed and _has_twins(problem):
             exact &= not selection.stopped
@@ -96,7 +95,7 @@ def judge_schedule(
                 raise SolverError(f"{least:.9g} is promised as the least; a plan has less")
             bounds = (least, *bounds[1:])
     gap = _gap(problem.aims, values, bounds)
-    left = gap if is_claimed else _gap(problem.aims, values, _closed(values, selection.bound))
+    left = _gap(problem.aims, values, _closed(values, tuple(map(max, bounds, selection.bound))))
     return Certificate(values, bounds, gap, left, basis=Basis.REBUILT, moved=moved)
 
 
@@ -109,9 +108,14 @@ def ordered(problem: States, order: Order) -> States:
         if order:
             raise SolverError("an order of the bricks is claimed, where it is given")
         return problem
-    if sorted(order) != sorted(problem.network.scene.build_order):
+    scene = problem.network.scene
+    if sorted(order) != sorted(scene.build_order):
         raise SolverError(f"the order {order} does not name every brick once")
-    if not order_rules(problem).allows(order):
+    begun = problem.free_rules.span(scene)[0]
+    ties = (
+        may_follow(scene, problem.orders, order[:k], order[k]) for k in range(begun, len(order))
+    )
+    if {*order[:begun]} != {*scene.build_order[:begun]} or not all(ties):
         raise SolverError("the order places a brick that nothing ties")
     return problem.at(order)
 
@@ -137,7 +141,7 @@ def _proven(
         found = proof.budget_bounds(values, claimed, selection.prices)
     else:
         found = proof.bounds(values) if len(margins) < len(values) else margins
-    bounds = _closed(values, (*margins, *found[len(margins) :]))
+    bounds = _closed(values, (*margins, *found[len(margins) :]))[: max(1, aims)]
     if not (problem.is_timed or problem.totals or problem.paths):
         promised = values if exact and not budgets else claimed
         for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
@@ -149,7 +153,6 @@ def _proven(
         claimed = bounds
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
-    bounds = (*bounds, *values[aims:])
     return Certificate(values, bounds, gap, left, {}, proof.states, proof.models, Basis.REBUILT)
 
 

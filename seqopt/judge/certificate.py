@@ -48,10 +48,10 @@ class Certificate(FrozenValue):
     Attributes
     ----------
     values : tuple of float
-        The value of every goal, recomputed; of candidates one, in the unit of the criterion.
+        The value of every goal, recomputed, then what the plan uses of every budget.
     bounds : tuple of float
         Lexicographic lower bounds of the goals, recomputed from the data; minus infinity where
-        nothing is proven.
+        nothing is proven. A budget has none.
     gap : float
         Largest difference of value and bound, relative to the size of the values: of the costs
         that a choice of candidates meets, their sum or the largest. Infinite where nothing is
@@ -162,7 +162,8 @@ def _twin_of(amount: Amount) -> Twin | None:
     if amount.name in BUILT_IN or is_tolerance(amount.name):
         if amount.margins:  # the cone program finds them, step by step
             return Twin(lambda states: np.zeros(len(states.possible)))
-        return Twin(lambda states: states.responses[amount.responses[0]])
+        least = -np.inf if amount.is_peak else 0.0  # a sum counts no tension that is none
+        return Twin(lambda states: states.responses[amount.responses[0]].clip(min=least))
     if amount.twin is None or amount.in_time:
         return None
     return Twin(partial(amount.checked, amount.twin))

@@ -60,9 +60,10 @@ class FrontProblem:
     def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
         self._problem = problem
         adds_up = [goal for goal in problem.goals if not goal.is_peak]
-        if len(adds_up) > 1 or not all(goal in (STEPS, REGRIPS) for goal in adds_up):
+        others = [goal for goal in adds_up if goal not in (STEPS, REGRIPS)]
+        if wrong := [*others, *adds_up[1:]]:
             raise ProblemError(
-                f"pareto: {adds_up[-1]} adds up along a plan; give responses, and steps or regrips"
+                f"pareto: {wrong[0]} adds up along a plan; give responses, and steps or regrips"
             )
         for name, step in (rounding or {}).items():
             if name not in self.names or not 0 < step < np.inf:

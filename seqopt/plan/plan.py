@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -448,7 +448,7 @@ class Plan(ShownBuild):
         proof = self.certificate
         rests_on = () if proof is None else self.graph.bounded(proof.rests_on)
         narrowed = self.graph.among and "optimal" in self.status
-        left = None if proof is None or self.gap is None else _known_gap(proof.claimed_gap)
+        left = None if proof is None or proof.claimed_gap == inf else _known_gap(proof.claimed_gap)
         return {
             "status": f"{self.status} among these" if narrowed else str(self.status),
             "ended": self.ended.value,

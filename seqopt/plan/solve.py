@@ -167,7 +167,7 @@ def default_formulation(problem: Problem) -> str:
     if not chooses_moves(problem):
         return graph.default_formulation
     if problem.scenarios and graph.totals:
-        return "scenario_search"
+        return "overlap_dp"
     if problem.scenarios:
         return "schedule_search" if problem.budgets else "minimax"
     return "labels" if problem.budgets else "overlap_dp"

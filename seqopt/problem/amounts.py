@@ -87,6 +87,13 @@ def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarr
     return found
 
 
+def require_named(part: Any) -> None:
+    """Raise a `ProblemError` if a part has a name by which lists of words cannot ask for it."""
+    name, kind = part.name, type(part).__name__.lower()
+    if not isinstance(name, str) or not name.strip() or "," in name:
+        raise ProblemError(f"{kind} {short(name)}: give a name without commas, by which to ask")
+
+
 @dataclass(frozen=True, repr=False)
 class Amount:
     """An amount of a build: an aim minimizes it, a budget caps it.
@@ -142,6 +149,13 @@ class Amount:
     of_criterion: bool = False
     needs_stays: bool | Callable[[Scene], bool] = field(default=False, compare=False)
     check: Callable[[Any], None] | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        require_named(self)
+        for part in ("states", "moves", "least", "show", "margins", "check"):
+            if not (getattr(self, part) is None or callable(getattr(self, part))):
+                given = short(getattr(self, part))
+                raise ProblemError(f"amount {self.name}: {part} is {given}; give a function")
 
     def __str__(self) -> str:
         return self.name
@@ -214,6 +228,14 @@ def _tolerated(value: float) -> float:
     return 1 / value if 0 < value < NO_TOLERANCE else 0.0 if value else np.inf
 
 
+@dataclass(frozen=True)
+class _Size(_Response):
+    """The values of a response, zero where it is below: all compressed is no tension."""
+
+    def __call__(self, states: StateArrays) -> Floats:
+        return np.maximum(super().__call__(states), 0.0)
+
+
 def worst(response: str) -> Amount:
     """Return the largest value of a response; of a tolerance, the least length, m, is shown."""
     show = _tolerated if is_tolerance(response) else None
@@ -261,7 +283,7 @@ REGRIPS = Amount("regrips", moves=attrgetter("regrips"))
 TRAVEL = Amount("travel", moves=attrgetter("distances"), unit="m", needs_stays=True)
 _SHOWN = {"tilt": _tilt_survived}
 _BOUNDS = [Amount(n, margins=_Margin(n), is_peak=True, show=_SHOWN.get(n)) for n in MARGINS]
-_TOTALS = [Amount(f"sum({n})", _Response(n), responses=(n,)) for n in (*OFFERED, LARGEST)]
+_TOTALS = [Amount(f"sum({n})", _Size(n), responses=(n,)) for n in (*OFFERED, LARGEST)]
 _EVERY = (MINMAX, SUM, STEPS, REGRIPS, TRAVEL, *map(worst, STATE_RESPONSES), *_BOUNDS, *_TOTALS)
 BUILT_IN = {amount.name: amount for amount in _EVERY}
 """Amounts that are always there, by name."""

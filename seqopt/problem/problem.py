@@ -371,13 +371,14 @@ def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
-def _goals(given: Sequence[Amount] | str, least: int = 0) -> tuple[Amount, ...]:
+def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount, ...]:
     """Return amounts, ``least`` of them or more, that are given as such, or by their names."""
-    goals = parse_goals(given) if isinstance(given, str) else given
-    kinds = {*map(type, goals)} if isinstance(goals, Sequence) else {type(goals)}
-    if kinds - {Amount} or len(kinds) < least:
+    some = (given,) if isinstance(given, str) else given
+    known = isinstance(some, Sequence) and all(isinstance(each, str | Amount) for each in some)
+    if not known or len(some) < least:
         raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
-    return tuple(goals)
+    each = (parse_goals(one) if isinstance(one, str) else (one,) for one in some)
+    return tuple(goal for goals in each for goal in goals)
 
 
 READ: dict[str, Callable[[Any], Any]] = {

@@ -38,7 +38,7 @@ from seqopt.engines.interface import Engine, linear_limit
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.network.network import Network
-from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call
+from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call, require_named
 from seqopt.problem.criteria import Criterion
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import (
@@ -327,6 +327,13 @@ class Resource:
     dominates: Callable[[Floats, Floats], Bools] | None = field(default=None, compare=False)
     twin: Resource | None = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        require_named(self)
+        if not isinstance(self.twin, Resource | None):
+            raise ProblemError(f"twin of resource {self.name}: give a Resource")
+        if not all(isinstance(value, Real) for value in self.start):
+            raise ProblemError(f"resource {self.name}: start is {short(self.start)}; give numbers")
+
     def __str__(self) -> str:
         return self.name
 
@@ -342,8 +349,9 @@ class Resource:
                 f"resource {self.name}: its function failed: {message_of(error)}"
             ) from error
         if found.shape != values.shape or np.isnan(found).any():
+            what = "NaN" if found.shape == values.shape else f"shape {found.shape}"
             raise ProblemError(
-                f"resource {self.name}: its function returned shape {found.shape}; give numbers "
+                f"resource {self.name}: its function returned {what}; give numbers "
                 f"{values.shape}, a row for each label"
             )
         return found
@@ -429,6 +437,9 @@ class Filter:
     twin: Passes | None = field(default=None, compare=False)
     loosened: Loosened | None = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        require_named(self)
+
     def __str__(self) -> str:
         return self.name
 
@@ -439,19 +450,19 @@ class Filter:
         """Return which states are proven to pass, (n,)."""
         if self.passes is None:
             return np.ones(len(states.rows), dtype=bool)
-        return call(f"filter {self.name}", self.passes, states).astype(bool)
+        return _truths(f"filter {self.name}", self.passes, states)
 
     def refuted(self, states: StateArrays) -> Bools:
         """Return which states are proven not to pass, (n,)."""
         if self.refuses is None:
             return ~self.proven(states)
-        return call(f"filter {self.name}", self.refuses, states).astype(bool)
+        return _truths(f"filter {self.name}", self.refuses, states)
 
     def refuted_again(self, states: StateArrays) -> Bools:
         """Return which states its twin proves not to pass, (n,); none without a twin."""
         if self.twin is None:
             return np.zeros(len(states.rows), dtype=bool)
-        return call(f"twin of filter {self.name}", self.twin, states).astype(bool)
+        return _truths(f"twin of filter {self.name}", self.twin, states)
 
     def ways(self, problem: Any) -> Iterator[tuple[str, Any]]:
         """Yield relaxations of a problem in this filter: in words, and the relaxed problem."""
@@ -460,6 +471,14 @@ class Filter:
         else:
             rest = _without(self, problem.filters)
             yield f"the filter {self.name} left out", replace(problem, filters=rest)
+
+
+def _truths(what: str, function: Any, states: StateArrays) -> Bools:
+    """Return what a user's function says of states, (n,) bool."""
+    found = call(what, function, states)
+    if found.dtype.kind != "b" and not np.isin(found, (0, 1)).all():
+        raise ProblemError(f"{what}: its function returned {short(found[0].item())}; give bool")
+    return found.astype(bool)
 
 
 def _without(part: object, parts: Sequence[Any]) -> tuple[Any, ...]:

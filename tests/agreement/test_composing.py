@@ -12,9 +12,9 @@ import seqopt
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
-from seqopt.graph._candidates import walk
-from seqopt.graph.formulation import FormulationKind, Watch, find_formulation, formulations
+from seqopt.graph.formulation import FormulationKind, Watch, find_formulation
 from seqopt.graph.states import build_states
+from seqopt.plan._answers import walk
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
@@ -121,7 +121,8 @@ FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 SCALES = np.array([scale for _, scale in ONES.limits])
 IGNORED = FreeRules(payload="ignored")
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,T_max", "travel", "T_max,sum")
-PLANS = [found for found in formulations("goals").values() if found.of_states]
+NAMES = ("best_first", "overlap_dp", "overlap_lp", "overlap_mip", "path_beam", "path_labels")
+PLANS = [find_formulation(name) for name in (*NAMES, "schedule_search")]
 
 
 @cache

@@ -104,7 +104,7 @@ def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, 
     found = dict(of_steps(problem, aim))
     for ask in (by_aims, by_goals):
         found |= {f"{ask.__name__}, {name}": value for name, value in ask(problem, aim)}
-    assert len(found) > 10
+    assert len(found) > 8
     assert found == pytest.approx(dict.fromkeys(found, found["steps"]), rel=1e-6)
 
 
@@ -123,7 +123,7 @@ def test_ranks_are_of_open_grips_alone():
     "formulation",
     [
         "overlap_dp",
-        *(pytest.param(n, marks=pytest.mark.slow) for n in ("flow_mip", "schedule_search")),
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("overlap_mip", "schedule_search")),
     ],
 )
 def test_the_least_sum_of_ranks_of_the_arch_is_one_number(formulation):
@@ -233,7 +233,7 @@ def test_a_response_is_one_number_in_all_words(free, aim):
     }
     if not free:
         found |= dict(by_aims(problem, aim))
-    assert len(found) > 5
+    assert len(found) > 4
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
 
 

@@ -15,7 +15,7 @@ from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.plan import Status
 from seqopt.plan.solve import graph_of
-from seqopt.problem.problem import Orders
+from seqopt.problem.problem import Aim, Orders
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import in_order
 from seqopt.sequence.part import Part
@@ -27,9 +27,9 @@ from tests.builders import from_both_sides, small_arch
 AIMS = ("minmax,steps", "steps,minmax", "sum", "travel,steps", "minmax,regrips,steps")
 FEW = ("minmax,steps", "steps,minmax", "travel,steps")
 PLANS = [
-    pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "flow_lp")))
+    pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "overlap_lp")))
     for name, found in formulations("goals").items()
-    if found.of_states and found.kind is FormulationKind.EXACT
+    if found.aim is not Aim.PEAK and found.kind is not FormulationKind.HEURISTIC
 ]
 
 

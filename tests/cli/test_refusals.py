@@ -47,7 +47,7 @@ BAD = {
     "optimize ARCH --budget travel=2m --budget travel=0.5": "budget travel=2m: it stands there",
     # scenarios
     f"{ROBUST} cvar=2": "cvar=2.0: give a level",
-    f"{ROBUST} worst-total --formulation minimax": "use scenario_search",
+    f"{ROBUST} worst-total --formulation minimax": "use overlap_dp",
     f"{ROBUST} worst-peak --formulation minimax --budget travel=2m": "couples all moves; use",
     f"{ROBUST} worst-total --schedule free --aim steps": "of one sum alone",
     f"{ROBUST} worst-peak --scenarios x": "--scenarios x: give a whole number",
@@ -59,7 +59,7 @@ BAD = {
     # the free schedule
     f"{FREE} --rule newest=never": "rule newest: 'never'; give one of either",
     f"{FREE} --aim speed": "aim 'speed' does not exist",
-    f"{FREE} --robots 7": "7 robots: the free schedule takes one to 5",
+    f"{FREE} --robots 7": "7 robots: give a number from one to 5",
     f"{FREE} --option width=0": "options width=0, growth=1.1: give a whole number",
     f"{FREE} --option speed=1": "--option speed=1: schedule_search has width",
     f"{FREE} --formulation minimax --aim steps": "minimax: a sum comes first",

@@ -179,7 +179,7 @@ def test_bricks_that_fly_off_are_a_mechanism(words, number):
     network = build_network(load_scene(words))
     step = sequential(network)[number - 1]
     with pytest.raises(MechanismError, match=r"joints open or slip and brick \d becomes"):
-        step_fields(DiscreteEngine(network, DRY), step)
+        step_fields(DiscreteEngine(network, replace(DRY, friction=0.466)), step)
     bonded = step_fields(DiscreteEngine(network, EPOXY), step, Want.BRICKS)
     assert np.abs(bonded.brick_twist).max() < 0.01
 

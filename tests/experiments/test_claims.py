@@ -149,7 +149,7 @@ def test_commands_that_are_written_down_exist():
         assert (ROOT / module.replace(".", "/")).with_suffix(".py").exists(), module
 
 
-ROW = (formulations.FREE, 7, "flow_lp", 0.0)
+ROW = (formulations.FREE, 7, "overlap_lp", 0.0)
 
 
 @pytest.mark.slow

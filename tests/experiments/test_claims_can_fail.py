@@ -107,7 +107,7 @@ CHECKS = {
             *(column, value, {"bricks": 13, "formulation": name, "question": question}),
         )
         for part, column, value, name, question in (
-            ("values", "value", 1.0, "flow_lp", formulations.FREE),
+            ("values", "value", 1.0, "overlap_lp", formulations.FREE),
             ("plans", "value", 0.1, "beam", formulations.FREE),
             ("bounds", "bound", 300.0, "overlap_lp", formulations.BUDGET),
             ("models", "models", 1, "best_first", formulations.FREE),

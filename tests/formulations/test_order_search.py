@@ -29,7 +29,7 @@ from tests.builders import small_arch
 from tests.strategies import free_builds
 
 LONG = (pytest.mark.slow, pytest.mark.long)
-PROGRAMS = ("flow_lp", "flow_mip")
+PROGRAMS = ("overlap_lp", "overlap_mip")
 TWO = FreeRules(robots=("rob1", "rob2"), least_grips=1)
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 
@@ -114,7 +114,7 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
 
 OF_ONE_AIM = {"sum": ("minimax",)}  # what they refuse
 TAKE_ORDERS = [
-    pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "path_dp")))
+    pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "overlap_dp")))
     for name in seqopt.formulations("order")
     if name != "order_search"
 ]

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from experiments.harness.layers import best_in_order
 from formulations.on_graph import _Totals
 from seqopt.graph import Graph
-from seqopt.graph._candidates import _branches
 from seqopt.graph._labels import CappedSums, Joint, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import FAILS, PASSES, _lazy_path
+from seqopt.plan._answers import _branches
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import Ranked, _ranks_of
 from seqopt.problem.problem import WORST_TOTAL, Aim, cvar

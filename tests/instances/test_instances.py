@@ -43,7 +43,7 @@ def posed(kind):
 
 KINDS = ("sum", "capped", "tail", "peak", "within", "robust")
 LONG = ("orders", "time", "late")
-LATE = {"orders": ("flow_mip", "overlap_mip"), "tail": ("flow_mip", "overlap_mip", "flow_lp")}
+LATE = {"orders": ("overlap_mip",), "tail": ("overlap_mip", "overlap_lp")}
 EVERY = [*KINDS, *(pytest.param(kind, marks=pytest.mark.slow) for kind in LONG)]
 
 
@@ -126,10 +126,10 @@ def test_heuristics_answer_as_on_the_scene(tmp_path, name, criterion):
 
 
 def test_what_does_not_fit_says_what_does(compiled):
-    with pytest.raises(ProblemError, match="use path_dp"):
+    with pytest.raises(ProblemError, match="use overlap_dp"):
         seqopt.solve(compiled("sum"), "minimax")
     with pytest.raises(ProblemError, match="use makespan_labels"):
-        seqopt.solve(compiled("time"), "path_dp")
+        seqopt.solve(compiled("time"), "overlap_dp")
 
 
 @pytest.mark.parametrize("kind", KINDS[:4])

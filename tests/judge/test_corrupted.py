@@ -12,9 +12,8 @@ import pytest
 
 import seqopt
 from formulations.times._labels import InTime
-from seqopt.graph._candidates import CandidateCosts
-from seqopt.graph._spaces import bisected
-from seqopt.graph.states import States
+from seqopt.graph._spaces import OrderRules, bisected
+from seqopt.graph.states import CandidateCosts, States
 from seqopt.problem import Amount, Filter, requirements
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
 from seqopt.sequence._space import FreeSpace, ScheduleSpace
@@ -127,6 +126,23 @@ def test_a_margin_that_the_search_gets_wrong_is_seen(space, amount, shift, monke
 
     monkeypatch.setattr("seqopt.graph._spaces.bisected", wrong)
     assert is_refused(posed(space, amount))
+
+
+ENDS_FIRST = {"lost": lambda self, placed: (1, 4) if not {1, 4} <= placed else (2, 3)}
+UNTIED = {"let through": lambda self, placed: self.scene.build_order if placed else (2,)}
+
+
+@pytest.mark.parametrize("wrong", [ENDS_FIRST, UNTIED], ids=lambda wrong: next(iter(wrong)))
+def test_orders_that_the_search_gets_wrong_are_seen(wrong, monkeypatch):
+    """All orders but those from both ends are lost, or one is let through that nothing ties."""
+    assert control("orders", "D_max")
+    ((_, follow),) = wrong.items()
+
+    def next_bricks(rules, placed):
+        return tuple(brick for brick in follow(rules, placed) if brick not in placed)
+
+    monkeypatch.setattr(OrderRules, "next_bricks", next_bricks)
+    assert is_refused(replace(posed("orders", "D_max")))
 
 
 def test_every_amount_is_attacked():

@@ -116,7 +116,7 @@ POSED = {
     "loop, two budgets": (partial(loop, budgets=["travel=0.9", "robot_use:rob1=20:15"]), "labels"),
     "loop, scenarios": (
         partial(over_scenarios, partial(loop, criterion="worst-ratio"), CHAIN, "worst-total"),
-        "scenario_search",
+        "overlap_dp",
     ),
     "free": (partial(free, "minmax,steps"), "schedule_search"),
     "free, sum": (partial(free, "sum,regrips"), "schedule_search"),
@@ -133,8 +133,8 @@ COMPILED = {
     "loop": "overlap_dp",
     "loop, worst": "minimax",
     "loop, budget": "labels",
-    "loop, scenarios": "path_dp",
-    "free": "path_dp",
+    "loop, scenarios": "overlap_dp",
+    "free": "overlap_dp",
     "free, sum within": "schedule_search",
     "time": "makespan_labels",
 }

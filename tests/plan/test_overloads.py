@@ -183,7 +183,7 @@ def test_every_plan_has_one_summary():
     plans = [
         seqopt.optimize(scene, criterion=ones),
         seqopt.optimize(scene, criterion=ones, formulation="cascade", search=Search(proof=False)),
-        seqopt.optimize(scene, criterion=ones, formulation="path_dp"),
+        seqopt.optimize(scene, criterion=ones, formulation="overlap_dp"),
         seqopt.optimize(scene, "free"),
         seqopt.optimize(scene, criterion=ones, robust=Robust(count=2)),
         seqopt.optimize(scene, "free", order="search"),

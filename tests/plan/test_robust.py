@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import seqopt
 from experiments.harness.layers import LayeredCosts
 from formulations.on_graph import by_weights, cheapest_by, least_total
-from formulations.path_dp import SCENARIO_SEARCH
+from formulations.overlap_dp import OVERLAP_DP
 from formulations.scenario_program import solve_program
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
@@ -58,7 +58,7 @@ class Found(NamedTuple):
 
 def solved(layers, aim, formulation=None, time_limit=np.inf):
     """The judged answer for layers over scenarios that are given by their costs alone."""
-    made, name = compile_totals("drawn", layers, aim), "scenario_search"
+    made, name = compile_totals("drawn", layers, aim), "overlap_dp"
     if aim == WORST_PEAK:
         made, name = compile_costs("drawn", largest_of(layers), Aim.PEAK), "minimax"
     run = Run(time_limit)
@@ -148,9 +148,9 @@ def claiming(**claim):
     """The search over scenarios, of whose answer something is changed."""
 
     def solve(instance):
-        return replace(SCENARIO_SEARCH.solve(instance), **claim)
+        return replace(OVERLAP_DP.solve(instance), **claim)
 
-    return replace(SCENARIO_SEARCH, solve=solve)
+    return replace(OVERLAP_DP, solve=solve)
 
 
 @pytest.mark.parametrize("weights", [(1.0, 0.0), (0.7, 0.7), (-0.5, 0.5)])
@@ -164,7 +164,7 @@ def test_weights_that_do_not_fit_the_aim_prove_nothing(weights):
 def test_the_gap_that_weights_leave_is_real_here():
     """Half of either scenario proves 2; no choice is better than 3."""
     graph = compile_totals("two", LAYERS, WORST_TOTAL).instance.asked
-    cheapest = cheapest_by(SCENARIO_SEARCH.solve.choose, Watch())
+    cheapest = cheapest_by(OVERLAP_DP.solve.choose, Watch())
     weighed = by_weights(graph, WORST_TOTAL, cheapest, Watch())
     assert weighed.bound == pytest.approx(2.0)
     assert least_total(graph, WORST_TOTAL, cheapest, Watch()).bound == pytest.approx(3.0)

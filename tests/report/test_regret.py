@@ -36,7 +36,7 @@ FOUR = (
     ("compliance", FREE, "schedule_search", "", True, 0.1, 0.0),
     ("compliance", "loop", "cascade", "no proof", False, 0.05, 0.18),
     ("frame", FREE, "schedule_search", "", True, 30.0, 0.0),
-    ("compliance", FREE, "flow_mip", "", True, 0.3, 0.0),
+    ("compliance", FREE, "overlap_mip", "", True, 0.3, 0.0),
 )
 
 
@@ -73,7 +73,7 @@ def test_what_to_take_is_computed():
         "the loop in 0.0500 s: its plan is 18 % worse."
     )
     others = made(*FOUR[2:])  # other rows, another sentence
-    assert others.sentence.startswith("Take compliance with flow_mip on the free schedule")
+    assert others.sentence.startswith("Take compliance with overlap_mip on the free schedule")
     assert "nothing else is sooner" in others.sentence
     unproven = made(FOUR[1])
     assert not unproven.is_proven
@@ -127,7 +127,7 @@ def test_every_way_is_a_row_and_nothing_is_drawn_wrong(measured):
     table = measured.table
     assert {"loop", FREE} == {*table["schedule"]}
     assert {"compliance", "frame"} <= {*table["engine"]}
-    assert {"cascade", "beam", "flow_mip", "path_dp", "minimax"} <= {*table["formulation"]}
+    assert {"cascade", "beam", "overlap_mip", "overlap_dp", "minimax"} <= {*table["formulation"]}
     assert {"", "no proof", "near:6", "ranks"} == {*table["without"]}
     assert (table["status"] == DONE).all()
     assert (table["regret"] >= 0).all()

@@ -66,7 +66,7 @@ def newtons(error):
     return float(re.search(r"a payload of (\d+) N \(--payload \1\)", str(error))[1])
 
 
-@pytest.mark.parametrize("name", ["schedule_search", "flow_lp"])
+@pytest.mark.parametrize("name", ["schedule_search", "overlap_lp"])
 def test_every_formulation_of_states_refuses_what_nobody_carries(name):
     with pytest.raises(InfeasibleError, match=TOO_HEAVY) as caught:
         seqopt.solve(posed(wall(150.0, 150.0)), name)

@@ -17,6 +17,7 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.network.network import build_network
 from seqopt.sequence.methods import SCHEDULES, sequential
 from seqopt.sequence.part import find_schedule
+from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import (
     parse_plan,
     parse_schedule,
@@ -34,13 +35,14 @@ START = HEADER + "1,place,1,1,,\n2,place,2,1,2,\n"
 
 
 @pytest.mark.parametrize("name", SCHEDULES)
-def test_what_is_written_can_be_read(engine25, name):
-    schedule = SCHEDULES[name](engine25.network)
+def test_what_is_written_can_be_read(arch25, name):
+    network = build_network(with_robots(arch25, 5))
+    schedule = SCHEDULES[name](network)
     text = schedule_text(schedule)
-    assert parse_schedule(engine25.network, text, "x.csv") == replace(schedule, method="x")
+    assert parse_schedule(network, text, "x.csv") == replace(schedule, method="x")
     bare = re.sub(r"\?\d+", "?", text)  # numbers may be left out
-    assert parse_schedule(engine25.network, bare, "x.csv") == replace(schedule, method="x")
-    assert schedule_text(parse_schedule(engine25.network, bare, "x.csv")) == text
+    assert parse_schedule(network, bare, "x.csv") == replace(schedule, method="x")
+    assert schedule_text(parse_schedule(network, bare, "x.csv")) == text
 
 
 def test_a_move_lasts_until_its_robot_lets_go(arch25):

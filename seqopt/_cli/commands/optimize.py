@@ -50,8 +50,8 @@ def run(
     With --schedule free, choose every step. The answer is checked from the problem's own data, and
     plan, selection, responses, summary and a page for the browser are written.
 
-    With --aim, --stands, --order search or --schedule free states of the build are chosen: criteria
-    of ranks do not go with these. --no-proof goes with cascade and rank_search.
+    Criteria of ranks do not go with --schedule free, whose moves have no candidates to rank. With
+    --no-proof, cascade and rank_search solve only the models that they look at.
 
     Parameters
     ----------
@@ -196,7 +196,10 @@ def _proof(plan: Plan) -> str:
     if proof is None and plan.ended is End.STOPPED:
         return "left out, time is over; values and bounds are claimed"
     if proof is None or plan.gap is None:
-        return "none; how much better another plan may be is not known"
+        goal, bound = next(iter(plan.bound.items()), ("", None))
+        if bound is None:
+            return "none; how much better another plan may be is not known"
+        return f"none; the search claims that {goal} is {bound:.6g} at least"
     models, states = proof.models or plan.models, proof.states
     looked = f"{models:,} model{'s' * (models != 1)}"
     looked += f" and {states:,} state{'s' * (states != 1)}" if states else ""

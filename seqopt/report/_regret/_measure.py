@@ -327,7 +327,7 @@ def _ways(course: _Course, reference: str) -> tuple[list[Way], dict[str, str]]:
         known = formulations("costs" if kind == LOOP else "goals").values()
         bounds = {f.name for f in known if f.kind is FormulationKind.BOUND}
         slow = bounds | {f.name for f in known if f.name.endswith("_mip")}
-        names = sorted((f.name for f in known), key=lambda n: (n in slow, n != "path_dp"))
+        names = sorted((f.name for f in known), key=lambda n: (n in slow, n != "overlap_dp"))
         every += [Way(base, kind, name) for name in names]
     quick = [way for way in usual if way.engine not in SLOW]
     out = [*quick, *(Way(base, *more) for more in _variants(course)), *every, *usual]

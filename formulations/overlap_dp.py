@@ -7,9 +7,9 @@ For the open grips of a schedule it is
    \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
 
 with the costs :math:`c` of single candidates and :math:`d` of the step that neighboring moves
-share (``overlap_dp``), or with the largest cost in place of the sum (``minimax``); for a
-free schedule a path through its states (``path_dp``). With moves :math:`a = (u, v)` that take
-:math:`c_a`,
+share, or with the largest cost in place of the sum (``minimax``); for a free schedule a path
+through its states, over scenarios by weights and labels that they bound. With moves :math:`a = (u,
+v)` that take :math:`c_a`,
 
 .. math::
 
@@ -38,10 +38,7 @@ from seqopt.problem.problem import Aim
 def _least_peak(graph: Graph, watch: Watch) -> Choice:
     """Return the path of least peak, among these that of the least sum of its parts."""
     if not graph.peaks[0]:
-        raise ProblemError(
-            "minimax: a sum comes first, and no largest cost; use scenario_search over scenarios, "
-            "path_dp or overlap_dp elsewhere"
-        )
+        raise ProblemError("minimax: a sum comes first, and no largest cost; use overlap_dp")
     parts = graph.amounts[:, 0] if graph.alone is None else graph.alone.sum(axis=1)
     added = parts - min(0.0, float(parts.min()))  # of candidates, all paths have as many moves
     peaks, amounts = (True, *graph.peaks[1:], False), np.column_stack([graph.amounts, added])
@@ -49,16 +46,7 @@ def _least_peak(graph: Graph, watch: Watch) -> Choice:
     return found._replace(bounds=found.bounds[:-1])
 
 
-PATH_DP = on_graph(
-    "path_dp", "dynamic programming over all states, one goal after the other", shortest
-)
 OVERLAP_DP = on_graph("overlap_dp", "full overlap, dynamic programming", shortest, aim=Aim.SUM)
 MINIMAX = on_graph(
     "minimax", "smallest worst cost over the build", _least_peak, aim=Aim.PEAK, alone=True
-)
-SCENARIO_SEARCH = on_graph(
-    "scenario_search",
-    "totals over scenarios, by weights and labels that they bound",
-    shortest,
-    answers=("tail", "order", "instance"),
 )
