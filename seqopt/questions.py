@@ -227,7 +227,7 @@ def assess(  # noqa: PLR0913  # every question is a word of its own
         Margins beside the verdicts, or all, with commas between them; each takes several times as
         long.
     friction : float, optional
-        Coefficient of friction of all joints (default: 0.466, of 25°, with every mortar).
+        Coefficient of friction of all joints (default: that of the mortar).
     workers : int, optional
         Processes to share the steps among (default: {default}).
     robots, cache, progress : optional
