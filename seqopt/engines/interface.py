@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache
 from itertools import combinations
 from typing import NamedTuple, Protocol
 
@@ -158,15 +157,9 @@ SHAPES = dict.fromkeys(FLAGS, (6,)) | {"edge_force": (), "displacement": (3,)}
 """Trailing shape of every field, for an edge, node, end, spring or brick."""
 
 
-@cache
-def names_wanted(want: Want) -> frozenset[str]:
-    """Return the names of the requested fields except grip forces."""
-    return frozenset(name for name, flag in FLAGS.items() if want & flag)
-
-
 def keep_wanted(answer: Fields, want: Want) -> Fields:
     """Return the requested fields alone."""
-    dropped = FLAGS.keys() - names_wanted(want)
+    dropped = [name for name, flag in FLAGS.items() if not want & flag]
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
@@ -295,7 +288,18 @@ def read_compliance(
         )
     if not np.isfinite(offsets).all():
         raise GripError("moved: a length is not finite; give meters")
-    _follow_bricks(network, columns, offsets, found)
+    # two rigid grips on one brick cannot stretch it: along it, both nodes go halfway between
+    ends = network.node_position[network.inner]
+    steps = ends[:, 1] - ends[:, 0]
+    axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    yields = found.compliant(*columns.shape)
+    for i, j in combinations(range(columns.shape[1]), 2):
+        one = columns[:, i] // 2 == columns[:, j] // 2
+        both = np.flatnonzero(one & ~yields[:, i] & ~yields[:, j])
+        axis = axes[columns[both, i] // 2]
+        stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
+        offsets[both, i] += 0.5 * stretch[:, None] * axis
+        offsets[both, j] -= 0.5 * stretch[:, None] * axis
     return replace(found, moved=offsets)
 
 
@@ -362,26 +366,6 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[_GripSpring]:
     return out
 
 
-def _follow_bricks(
-    network: Network, columns: Ints, offsets: Floats, compliance: GripCompliance
-) -> None:
-    """Restrict the offsets of two rigid grips on one brick to rigid motions, in place.
-
-    It cannot become longer: along it, both nodes go halfway between.
-    """
-    ends = network.node_position[network.inner]
-    steps = ends[:, 1] - ends[:, 0]
-    axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-    yields = compliance.compliant(*columns.shape)
-    for i, j in combinations(range(columns.shape[1]), 2):
-        one = columns[:, i] // 2 == columns[:, j] // 2
-        both = np.flatnonzero(one & ~yields[:, i] & ~yields[:, j])
-        axis = axes[columns[both, i] // 2]
-        stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
-        offsets[both, i] += 0.5 * stretch[:, None] * axis
-        offsets[both, j] -= 0.5 * stretch[:, None] * axis
-
-
 @contextmanager
 def _failing_in_a_line() -> Iterator[None]:
     """Let numerical failures of a function be a `SolverError`."""
@@ -397,17 +381,14 @@ def _failing_in_a_line() -> Iterator[None]:
         ) from error
 
 
-def no_sets(network: Network, bricks: int, held: int) -> Fields:
-    """Return the fields of no grip set at all that would hold some nodes: their shapes."""
+def no_sets(network: Network, bricks: int, held: int, *, sets: int = 0) -> Fields:
+    """Return the fields of no grip set at all that would hold some nodes: their shapes.
+
+    ``sets``: of so many, all zero, as of the empty site, which one set of no grips holds.
+    """
     counts = _counts_of_fields(network, bricks)
-    empty = {name: np.empty((0, count, *SHAPES[name])) for name, count in counts.items()}
-    return Fields(grip_force=np.empty((0, held, 3)), **empty)
-
-
-def _empty_site(network: Network) -> Fields:
-    """Return the fields of a site on which nothing stands, of one set of no grips."""
-    empty = no_sets(network, 0, 0)
-    return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})
+    empty = {name: np.zeros((sets, count, *SHAPES[name])) for name, count in counts.items()}
+    return Fields(grip_force=np.zeros((sets, held, 3)), **empty)
 
 
 def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:

@@ -24,8 +24,8 @@ from seqopt.engines.interface import (
     Fields,
     OpeningEngine,
     Want,
-    _empty_site,
     linear_limit,
+    no_sets,
     select_sets,
 )
 from seqopt.engines.registry import AutoEngine, _chooser_of, recipe_of, simplest
@@ -179,7 +179,7 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     if not step.bricks:  # where a take-down ends
-        return _empty_site(engine.network)
+        return no_sets(engine.network, 0, 0, sets=1)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 

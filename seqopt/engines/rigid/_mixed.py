@@ -122,19 +122,24 @@ class Ungripped(FrozenValue):
 
 def share(network: Network) -> Shared:
     """Return the system of the whole scene, of which those of all brick counts are parts."""
+    known: Shared | None = network.derived.get("mixed")
+    if known is not None:
+        return known
     springs, size = network.springs, network.inner.size
     brick = np.repeat(np.arange(len(network.inner)), 2)
     moved = point_motion(network.node_position[network.inner.ravel()] - network.centroid[brick])
     inner = spread(np.arange(size), brick, moved, (size, len(network.inner)))
     gap = deformation(springs.bodies, springs.position, network.centroid, springs.axes)
     shift = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))
-    return Shared(build_statics(network), gap, inner, shift.reshape(-1, 6))
+    network.derived["mixed"] = found = Shared(
+        build_statics(network), gap, inner, shift.reshape(-1, 6)
+    )
+    return found
 
 
-def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
+def ungripped_system(network: Network, bricks: int) -> Ungripped:
     """Return the part that all systems of a partial structure share."""
-    shared = share(network) if shared is None else shared
-    springs = network.springs
+    shared, springs = share(network), network.springs
     acting = springs.acting(bricks)
     steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
     length = float(np.linalg.norm(steps, axis=2).max())

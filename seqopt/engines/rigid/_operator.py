@@ -264,7 +264,7 @@ class ComplianceOperator(FrozenValue):
 
     def _mapped(self, name: str, index: Ints, force: Floats) -> Floats:
         """Return a field of sets whose twists and wrenches are summed first."""
-        states = self._states(name)
+        states = self.twist if name in _OF_TWISTS else self.wrench
         out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
@@ -283,15 +283,11 @@ class ComplianceOperator(FrozenValue):
                 out[np.arange(len(index)), edge[brick[:, i]]] += along[:, i]
         return out
 
-    def of_loads(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), made when first asked for."""
-        if name not in self._made:
-            self._made[name] = frozen(self._of_loads(name))
-        return self._made[name]
-
-    def _of_loads(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), which is not kept."""
-        out = self.maps.apply(name, self._states(name))
+    def of_loads(self, name: str, *, keep: bool = True) -> Floats:
+        """Return a field under every load, (l + 1, Q); kept from when it is first asked for."""
+        if name in self._made:
+            return self._made[name]
+        out = self.maps.apply(name, self.twist if name in _OF_TWISTS else self.wrench)
         if name == "edge_force":
             edge, axis, pull = self.maps.inner
             out[-1, edge] += pull
@@ -300,15 +296,13 @@ class ComplianceOperator(FrozenValue):
             out[rows, edge[self.held][:, None]] += axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
+        if keep:
+            self._made[name] = frozen(out)
         return out
 
     @cached_property
     def _made(self) -> dict[str, Floats]:
         return {}
-
-    def _states(self, name: str) -> Floats:
-        """Return the unknowns from which a field follows: twists or wrenches."""
-        return self.twist if name in _OF_TWISTS else self.wrench
 
 
 def are_few(unknowns: int, sets: int) -> bool:
@@ -388,15 +382,9 @@ class Pairs(NamedTuple):
     brick: Ints
     axis: Floats
 
-    def within(self, start: int, end: int) -> Pairs:
-        """Return those of some sets, counted from the first of these."""
-        found = self.only((self.sets >= start) & (self.sets < end))
-        return found._replace(sets=found.sets - start)
-
     def only(self, which: Bools) -> Pairs:
         """Select pairs."""
-        sets, first, second, brick, axis = self
-        return Pairs(sets[which], first[which], second[which], brick[which], axis[which])
+        return Pairs(*(each[which] for each in self))
 
     def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""

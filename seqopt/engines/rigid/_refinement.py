@@ -32,7 +32,6 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
-    Shared,
     Solution,
     Ungripped,
     bordered,
@@ -202,11 +201,9 @@ class Refinement:
     ``tied``: whether springs are known to tie every brick to the ground.
     """
 
-    def __init__(
-        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
-    ) -> None:
+    def __init__(self, network: Network, bricks: int, *, tied: bool = False) -> None:
         self.network, self.bricks = network, bricks
-        self.parts = ungripped_system(network, bricks, shared)
+        self.parts = ungripped_system(network, bricks)
         self.held = _HeldSystem(self.parts, tied=tied)
         size = 6 * bricks
         self.inner = self.parts.inner  # loads on scaled twists, (l, 6b), as of `load_rows`

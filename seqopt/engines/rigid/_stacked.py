@@ -80,10 +80,10 @@ class StackedOperator(ComplianceOperator):
         loads = self.loads(index, force)
         return {name: np.asarray(loads @ self.of_loads(name)) for name in names}
 
-    def of_loads(self, name: str) -> Floats:
+    def of_loads(self, name: str, *, keep: bool = True) -> Floats:
         if name not in self._made:
-            every = np.concatenate([each._of_loads(name) for each in self.parts])
-            self._made[name] = frozen(every)
+            every = [each.of_loads(name, keep=False) for each in self.parts]
+            self._made[name] = frozen(np.concatenate(every))
         return self._made[name]
 
 

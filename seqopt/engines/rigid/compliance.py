@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import (
+    FLAGS,
     RIGID,
     SHAPES,
     Fields,
@@ -33,7 +34,6 @@ from seqopt.engines.interface import (
     _failing_in_a_line,
     grip_columns,
     keep_wanted,
-    names_wanted,
     read_compliance,
     require_finite,
 )
@@ -56,7 +56,6 @@ from seqopt.work._workers import one_thread
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes
     from seqopt.engines.rigid._frontal import FrontalSystem
-    from seqopt.engines.rigid._mixed import Shared
     from seqopt.engines.rigid._refinement import Refinement
 
 _EXTREMES = Later("seqopt.engines.rigid._extremes")  # with numba alone
@@ -95,7 +94,8 @@ class _FastSolution:
         force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
         for start in range(0, sets, _CHUNK):
             part = slice(start, start + _CHUNK)
-            mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
+            mine = pairs.only((pairs.sets >= start) & (pairs.sets < start + _CHUNK))
+            mine = mine._replace(sets=mine.sets - start)
             own, most = compliance.select(part), accuracy / _UNSEEN
             found = grip_forces(operator, columns[part], index[part], mine, own)
             force[part] = found.force
@@ -115,14 +115,11 @@ class _FastSolution:
         """Return the fields of all sets by name."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
-        asked = names_wanted(want)
-        known = operator.answers([n for n in SHAPES if n in asked], self.index, force)
-        none, sets, found = np.empty((len(columns), 0)), len(columns), dict[str, Floats]()
+        known = operator.answers([n for n in SHAPES if want & FLAGS[n]], self.index, force)
+        none, found = np.empty((len(columns), 0)), dict[str, Floats]()
         for name, shape in SHAPES.items():
             flat = known.get(name, none)
-            found[name] = (
-                flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
-            )
+            found[name] = flat.reshape(len(flat), flat.shape[1] // prod(shape), *shape)
         share_pairs(operator, self.index, force, found["edge_force"], self.pairs)
         borne = operator.by_grip(force)
         found["grip_force"] = borne[..., :3]
@@ -305,12 +302,6 @@ class ComplianceEngine(NamedEngine):
         return every if even.all() else int(springs.since[order][even.argmin()]) - 1
 
     @cached_property
-    def _shared(self) -> Shared:
-        """What the systems that correct answers are cut from."""
-        found: Shared = _MIXED.share(self.network)
-        return found
-
-    @cached_property
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self.network, self._tree)
@@ -329,9 +320,7 @@ class ComplianceEngine(NamedEngine):
         operator = self._operator(bricks, columns) if tied else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = _REFINEMENT.Refinement(
-                    self.network, bricks, self._shared, tied=tied
-                )
+                self._refinement = _REFINEMENT.Refinement(self.network, bricks, tied=tied)
             last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)
