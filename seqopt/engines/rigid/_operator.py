@@ -217,10 +217,6 @@ class ComplianceOperator(FrozenValue):
         """What rounding may leave of the answers to its loads."""
         return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
 
-    def covers(self, bricks: Ints) -> bool:
-        """Return whether loads act at the nodes of bricks."""
-        return len(self.held) == self.bricks or not np.count_nonzero(self.place.take(bricks) < 0)
-
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
         rows = load_rows(2 * self.place.take(columns // 2) + columns % 2, self.moments)

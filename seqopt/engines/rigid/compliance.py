@@ -277,7 +277,7 @@ class ComplianceEngine(NamedEngine):
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         known = self._kept.pop(bricks, None)
-        if known is None or not known.covers(columns // 2):
+        if known is None or (known.place.take(columns // 2) < 0).any():  # it bears no loads there
             held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
