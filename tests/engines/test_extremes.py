@@ -130,12 +130,13 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
 def test_blocks_answer_responses_by_them(compiled):
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = np.sort(sets_of(engine.network, 6, 2, 50), axis=1)
-    found = answer(engine, Block(6, sets, tuple(sorted(EXTREMES)), compiled=compiled))
+    names = tuple(sorted(EXTREMES))
+    found = answer(engine, Block(6, sets, names, compiled=compiled))
     fields = engine.solve(6, sets, Want.RESPONSES)
-    for name, values in found.values.items():
+    for name, values in zip(names, found.T, strict=False):
         true = CHOSEN_BY[name].of(engine.network, fields)
         assert np.abs(values - true).max() <= CLOSE * max(np.abs(true).max(), 1e-9)
-    assert np.abs(found.forces - lengths(fields.grip_force)).max() <= 1e-9
+    assert np.abs(found[:, len(names) :] - lengths(fields.grip_force)).max() <= 1e-9
 
 
 @needs_numba

@@ -33,13 +33,7 @@ from seqopt.contact.mortar import quadrature_stiffness as bed_stiffness
 from seqopt.engines.interface import FAR, Fields, GripCompliance, OpeningEngine, grip_springs
 from seqopt.engines.rigid._mixed import Solution, mechanism_error, require_resistance, respond
 from seqopt.errors import SolverError
-from seqopt.network._mechanics import (
-    build_statics,
-    deformation,
-    node_motion,
-    point_motion,
-    spring_stiffness,
-)
+from seqopt.network._mechanics import deformation, node_motion, point_motion, spring_stiffness
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
@@ -473,5 +467,4 @@ def _fields(
             force[mine] = pulls.reshape(-1, 3)
     twist = (system.unit * moved)[None, : 6 * system.bricks]
     solution = Solution(twist, wrench[None], force[None], moment[None], compliant[None])
-    motion, statics = node_motion(network, system.bricks), build_statics(network)
-    return respond(network, statics, motion, columns[None], solution)
+    return respond(network, node_motion(network, system.bricks), columns[None], solution)

@@ -216,7 +216,7 @@ class FrontalSystem:
             for i, held in enumerate(columns):
                 own = compliance.select(slice(i, i + 1))
                 solution = _solve_one(parts, self._factor, held, own, largest)
-                answers.append(respond(network, parts.statics, motion, held[None], solution))
+                answers.append(respond(network, motion, held[None], solution))
         return _join_sets(answers)
 
 

@@ -69,7 +69,7 @@ class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
     ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
-    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled, of the
+    ``network.inner``, m; ``deformation`` (6s, 6b): scaled, of the
     acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
     ``load`` (6b,): weight and loads, scaled; ``moved`` (6s,): what the ground's movement adds to
     the joints' equations; ``acting`` (s,); ``twist_unit`` (6b,), ``wrench_unit`` (6s,): scaled
@@ -79,7 +79,6 @@ class Ungripped(FrozenValue):
     network: Network
     bricks: int
     inner: sparse.csr_array
-    statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
     load: Floats
@@ -164,7 +163,6 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
         network=network,
         bricks=bricks,
         inner=inner,
-        statics=shared.statics,
         deformation=sparse.csr_array(scaled, shape=(rows, size)),
         stiffness=stiffness,
         load=inner.T @ weight / unit + applied * twist_unit / unit,
@@ -250,48 +248,45 @@ class Solution(FrozenValue):
 
 
 def respond(
-    network: Network,
-    statics: Statics,
-    motion: Floats | sparse.csr_array,
-    columns: Ints,
-    solution: Solution,
+    network: Network, motion: Floats | sparse.csr_array, columns: Ints, solution: Solution
 ) -> Fields:
     """Return the fields of grip sets, of which ``motion`` is as `node_motion` returns it."""
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
     load = np.tile(network.inner_load(bricks), (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
-    carried = edge_forces(network, statics, wrench, load)
+    carried = edge_forces(network, wrench, load)
     split_pairs(network, columns, force, carried, solution.compliant)
     moved = (motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3)
     return Fields(
         edge_force=carried,
         displacement=moved + network.ground_motion(bricks),
         grip_force=force,
-        support=reactions(network, statics, wrench),
+        support=reactions(network, wrench),
         joint_wrench=wrench,
         brick_twist=twist.reshape(sets, bricks, 6),
         grip_moment=solution.moment,
     )
 
 
-def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
+def edge_forces(network: Network, wrench: Floats, load: Floats) -> Floats:
     """Return the edge forces (S, E), tension positive.
 
     ``wrench``: as of `Solution`; ``load`` (S, 2b, 3): at the inner nodes, forces of grips included.
     """
     sets, bricks = len(load), load.shape[1] // 2
-    edges = network.count_edges(bricks)
+    statics, edges = share(network).statics, network.count_edges(bricks)
     through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
     carried = (statics.edge_of_spring[:edges] @ through.T).T
     carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
     return np.asarray(carried)
 
 
-def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
+def reactions(network: Network, wrench: Floats) -> Floats:
     """Return force and moment (S, G, 6) of every ground end about its fixed point."""
     at_spring = wrench[:, network.springs.support]
-    return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
+    moment = share(network).statics.support_of_spring
+    return np.asarray(np.einsum("gij,sgj->sgi", moment, at_spring))
 
 
 def split_pairs(
@@ -453,7 +448,7 @@ def solve_mixed(
     for i, grips in enumerate(columns):
         own = compliance.select(slice(i, i + 1))
         solution = solve_load(parts, grips, parts.load, parts.moved, own)
-        answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
+        answers.append(respond(network, parts.motion, grips[None], solution))
     return _join_sets(answers)
 
 

@@ -380,7 +380,8 @@ class Pairs(NamedTuple):
 
     def only(self, which: Bools) -> Pairs:
         """Select pairs."""
-        return Pairs(*(each[which] for each in self))
+        sets, first, second, brick, axis = self
+        return Pairs(sets[which], first[which], second[which], brick[which], axis[which])
 
     def rigid(self, compliance: GripCompliance, sets: int, grips: int) -> Bools:
         """Return which pairs (p,) have two rigid grips, in so many sets."""

@@ -256,7 +256,7 @@ class _Corrector:
         wrench, twist = unscaled(parts, states[done])
         mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
-        fields = respond(network, parts.statics, operator.maps.motion, columns[done], solution)
+        fields = respond(network, operator.maps.motion, columns[done], solution)
         if done.all():
             return fields
         rest = compliance.select(~done)
