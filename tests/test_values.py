@@ -13,7 +13,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import face_quadrature, find_elastic_limits
 from seqopt.engines.diagnosis import diagnose
-from seqopt.engines.discrete.engine import _build_system, _held_nodes, _settle
+from seqopt.engines.discrete import _build_system, _held_nodes, _settle
 from seqopt.engines.interface import RIGID, Want, read_compliance
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system

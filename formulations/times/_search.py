@@ -33,8 +33,7 @@ from seqopt.graph.graph import PEAK, TIME, tied
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.times._curing import CuringBuilds
-from seqopt.times._fall_cuts import FallCuts
+from seqopt.times._curing import CuringBuilds, FallCuts
 from seqopt.times._graph import timed_graph
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
 from seqopt.times._twin import makespan

@@ -13,7 +13,7 @@ from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 
 if TYPE_CHECKING:
-    from seqopt.arms._postures import PostureTable
+    from seqopt.arms._tables import PostureTable
 
 
 def find_postures(

@@ -17,7 +17,7 @@ from scipy.stats import rankdata
 import seqopt
 from seqopt._cli.main import main
 from seqopt._files import csv_text
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import FLAGS, Engine, Want
 from seqopt.engines.registry import ENGINES, make_engine
