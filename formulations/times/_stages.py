@@ -252,9 +252,10 @@ class Stages:
         prices = self._carrying.prices(kept, Watch(0.0))
         return self._carrying.sweep(kept, Caps(), prices, Watch()).best
 
-    def values(self, path: Sequence[int]) -> list[float]:
-        """Return the values of goals of a path, zero for makespans."""
-        return [self._taken(path, k) for k in range(len(self._problem.goals))]
+    def values(self, path: Sequence[int], makespan: float) -> tuple[float, ...]:
+        """Return the values of goals of a path that takes so long, s."""
+        goals = enumerate(self._problem.goals)
+        return tuple(makespan if goal.in_time else self._taken(path, k) for k, goal in goals)
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
         each, kinds = prices.each, prices.kinds

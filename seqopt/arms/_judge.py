@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from seqopt.arms._model import ArmModel
 
 
+_LITTLE = 1e-4  # by which joints are moved, rad or m
+_SAME = 1e-6  # difference of compliances, over the largest
+_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
+
+
 class PostureRules:
     """What a posture table allows to robots in a scene.
 
@@ -80,7 +85,7 @@ class PostureRules:
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
     """Raise a `StepError` if arms have no postures that go together in a step.
 
-    Or if the compliance of their grips is not that of their joints.
+    Or if one is not at its node, or the compliance of a grip is not that of its arm's joints.
     """
     rules = PostureRules(scene, range(len(scene.robots)))
     place = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
@@ -88,25 +93,12 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
         held = np.array([[place[node] for node in step.grips]])
         if not rules.allow(step.bricks, held)[0]:
             raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")
-    _check_grips(scene)
-
-
-_LITTLE = 1e-4  # by which joints are moved, rad or m
-_SAME = 1e-6  # difference of compliances, over the largest
-_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
-
-
-def _check_grips(scene: Scene) -> None:
-    """Raise a `StepError` if the compliance of a grip is not that of the joints of its arm.
-
-    Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
-    """
     held, table = scene.held_postures, find_table(scene)
     if held is None:
         return
     from seqopt.arms._model import ArmModel  # noqa: PLC0415  # few scenes have arms
 
-    for own, robot in enumerate(held.robots.tolist()):
+    for own, robot in enumerate(held.robots.tolist()):  # at all nodes: a proof uses all
         arm, name = scene.robots[robot].arm, scene.robots[robot].name
         assert arm is not None
         model, given = ArmModel(arm), held.compliance(scene.arms)[own]

@@ -265,17 +265,17 @@ def each_verdict(
             prove(bricks, common)  # a trial: forces that hold it hold all of these
         for step in group:
             key = bricks, step.grips
-            if key not in found:
-                found[key] = _proven_state(*prove(*key)) if bricks else _NOTHING
+            if not bricks:
+                found[key] = _NOTHING
+            elif key not in found:
+                assembly, proven, way = prove(*key)
+                verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+                unproven = int(verdict is Verdict.UNDECIDED)
+                if verdict is Verdict.FALLS:
+                    motion = proven.answer.motion
+                failure = _failure(assembly, motion)
+                found[key] = Stability(verdict, way.value, unproven=unproven, **failure)
             yield found[key]
-
-
-def _proven_state(assembly: Assembly, proven: Proven, way: Way) -> Stability:
-    """Return what a chain proves of a partial structure."""
-    verdict, still = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
-    failure = _failure(assembly, proven.answer.motion if verdict is Verdict.FALLS else still)
-    unproven = int(verdict is Verdict.UNDECIDED)
-    return Stability(verdict, proof=way.value, unproven=unproven, **failure)
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:

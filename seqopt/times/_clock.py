@@ -203,13 +203,10 @@ class Clock(Book):
             valid[:, alike] = valid[:, alike].mean(axis=1, keepdims=True)
         self._multipliers = valid / np.maximum(1.0, valid.sum(axis=1, keepdims=True))
         self._left = [_to_go(acts.graph, acts.work @ each) for each in self._multipliers]
+        # of all builds, by multipliers alone, s
+        self.bound = max((float(left[0]) for left in self._left), default=0.0)
         placed = np.zeros(0) if acts.cured is None else acts.cured.placed
         self.first = np.concatenate([np.zeros(1 + columns), placed])
-
-    @property
-    def bound(self) -> float:
-        """Lower bound of all builds by multipliers alone, s."""
-        return max((float(left[0]) for left in self._left), default=0.0)
 
     def follow(self, arc: Ints, values: Floats) -> Floats:
         last = 1 + self._acts.count
