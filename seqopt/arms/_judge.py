@@ -88,10 +88,10 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
     Or if one is not at its node, or the compliance of a grip is not that of its arm's joints.
     """
     rules = PostureRules(scene, range(len(scene.robots)))
-    place = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
+    places = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     for step in steps:
-        held = np.array([[place[node] for node in step.grips]])
-        if not rules.allow(step.bricks, held)[0]:
+        grips = np.array([[places[node] for node in step.grips]])
+        if not rules.allow(step.bricks, grips)[0]:
             raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")
     held, table = scene.held_postures, find_table(scene)
     if held is None:
