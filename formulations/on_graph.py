@@ -56,7 +56,7 @@ from seqopt.graph.graph import (
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
-from seqopt.work.progress import Tell, answered
+from seqopt.work import Tell, answered
 
 _Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
 STEPS = 400  # weights that are tried at most

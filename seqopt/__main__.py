@@ -24,7 +24,7 @@ def run() -> int:
         _prepare()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         from seqopt._cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
-        from seqopt.work.progress import interrupt_main  # noqa: PLC0415
+        from seqopt.work import interrupt_main  # noqa: PLC0415
 
         load(sys.argv[1:])
 

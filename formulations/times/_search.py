@@ -37,7 +37,7 @@ from seqopt.times._curing import CuringBuilds, FallCuts
 from seqopt.times._graph import timed_graph
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
 from seqopt.times._twin import makespan
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 class Soonest(NamedTuple):

@@ -24,7 +24,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
 from seqopt.sequence.part import find_scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
     from seqopt.arms._tables import PostureTable

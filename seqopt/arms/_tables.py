@@ -28,7 +28,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.arm import MOST, Arm, HeldPostures
 from seqopt.scene.scene import Scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 _SWEEPS = 50  # over all robots and nodes, each given its best posture beside those of the others
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seqopt.scene.scene import Scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
     from seqopt.arms._tables import PostureTable

@@ -16,7 +16,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import NothingFoundError, TimeUpError
 from seqopt.graph.formulation import Solution, Watch
 from seqopt.problem.criteria import Criterion, Ranked, RankSum, state_costs
-from seqopt.work._workers import keep
+from seqopt.work import keep
 
 if TYPE_CHECKING:
     from seqopt.sequence._space import Candidates

@@ -22,7 +22,7 @@ from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._answers import Found, _proven, called, check_run, with_numbers
 from seqopt.plan._infeasible import claimed
-from seqopt.work.progress import INTERRUPT, answered
+from seqopt.work import INTERRUPT, answered
 
 PROVEN = 1 - 1e-6  # of a path that costs nothing and is said to cost this much: there is none
 

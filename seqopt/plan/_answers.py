@@ -29,7 +29,7 @@ from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import keep
+from seqopt.work import keep
 
 INFEASIBLE = Later("seqopt.plan._infeasible")  # seldom needed
 COUNTED = ("each", "stability")  # of a problem: they know what was computed

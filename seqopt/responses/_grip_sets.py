@@ -37,8 +37,7 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import hire, map_ordered, one_thread
-from seqopt.work.progress import Progress, Tell
+from seqopt.work import Progress, Tell, hire, map_ordered, one_thread
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 

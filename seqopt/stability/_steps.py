@@ -53,8 +53,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.work._workers import hire, map_ordered, one_thread
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, hire, map_ordered, one_thread, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is

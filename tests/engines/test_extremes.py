@@ -20,7 +20,7 @@ from seqopt.network.network import build_network
 from seqopt.responses._grip_sets import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
-from seqopt.work._workers import one_thread
+from seqopt.work import one_thread
 from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arch
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened

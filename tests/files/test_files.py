@@ -12,7 +12,7 @@ import pytest
 from seqopt import _files as files
 from seqopt._files import read_text, require_apart, require_folder, write_file, write_folder
 from seqopt.errors import FileError
-from seqopt.work.progress import answered, ending
+from seqopt.work import answered, ending
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")
 

@@ -13,7 +13,7 @@ from seqopt.plan.solve import graph_of, pose
 from seqopt.responses import _grip_sets as batches
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.study import EQUATIONS
-from seqopt.work._workers import keep
+from seqopt.work import keep
 
 distributed = pytest.importorskip("distributed", reason="extra dask")
 

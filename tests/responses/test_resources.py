@@ -44,7 +44,7 @@ from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study import EQUATIONS, WORST_RATIO
-from seqopt.work._workers import keep
+from seqopt.work import keep
 from seqopt.workflow import optimize
 from tests.builders import running_bond, six_bricks
 

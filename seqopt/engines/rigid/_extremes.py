@@ -35,7 +35,7 @@ from seqopt.engines.rigid._operator import (
     solve_positive,
     well_conditioned,
 )
-from seqopt.work._workers import cores, in_threads, one_thread
+from seqopt.work import cores, in_threads, one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave

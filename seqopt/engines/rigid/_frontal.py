@@ -44,7 +44,7 @@ from seqopt.engines.rigid._mixed import (
 from seqopt.engines.rigid._operator import ResponseMaps, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
-from seqopt.work._workers import one_thread
+from seqopt.work import one_thread
 
 AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
 _SHRINKING = 1e-4  # largest correction from which on the next ones are foreseen

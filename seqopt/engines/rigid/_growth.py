@@ -25,7 +25,7 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.work._workers import cores, in_threads
+from seqopt.work import cores, in_threads
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache

@@ -37,7 +37,7 @@ from seqopt.network._mechanics import (
 )
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
-from seqopt.work._workers import one_thread
+from seqopt.work import one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied

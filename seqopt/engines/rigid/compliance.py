@@ -51,7 +51,7 @@ from seqopt.engines.rigid._operator import (
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work._workers import one_thread
+from seqopt.work import one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes

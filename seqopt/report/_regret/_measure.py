@@ -47,7 +47,7 @@ from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import Stage, Tell, ending
+from seqopt.work import Stage, Tell, ending
 
 TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
