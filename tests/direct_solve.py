@@ -44,7 +44,8 @@ def solve_dense(
     parts = RigidStructure(acting, gap, stiffness, matrix, motion, inner)
     if compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = compliance.offsets(*columns.shape)
+    none = np.zeros((*columns.shape, 3))
+    far = none if compliance.moved is None else compliance.moved
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return _join_sets([no_sets(network, bricks, columns.shape[1]), *answers])

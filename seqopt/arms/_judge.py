@@ -37,6 +37,7 @@ class PostureRules:
         self._table, self._rows = find_table(scene), permits(scene).rows
         self._armed = [(c, r) for c, r in enumerate(team) if scene.robots[r].arm is not None]
         self._known: dict[tuple[int, ...], bool] = {}
+        # by bricks, robot and place: postures that hit nothing, as bits of a number
         self._options: dict[tuple[int, int, int], int] = {}
         column = {name: i for i, name in enumerate(self._table.bricks)}
         self._placed = [column[name] for name in scene.build_order]
@@ -51,22 +52,19 @@ class PostureRules:
         ``states`` (n, c): places in build order of the nodes held, from 1; none above 0 is free.
         """
         held = states[:, [column for column, _ in self._armed]].clip(min=0).tolist()
+        standing = self._placed[:bricks]
         for places in held:
-            if (bricks, *places) not in self._known:
-                pairs = zip(self._armed, places, strict=True)
-                masks = [self._mask(bricks, robot, place) for (_, robot), place in pairs if place]
-                self._known[bricks, *places] = self._fit(masks)
+            if (bricks, *places) in self._known:
+                continue
+            pairs = zip(self._armed, places, strict=True)
+            asked = [(bricks, robot, place) for (_, robot), place in pairs if place]
+            for key in asked:
+                if key not in self._options:
+                    rows = [row for row in self._rows[key[1:]].tolist() if row >= 0]
+                    clear = (row for row in rows if not self._table.hits[row, standing].any())
+                    self._options[key] = sum(1 << row for row in clear)
+            self._known[bricks, *places] = self._fit([self._options[key] for key in asked])
         return np.array([self._known[bricks, *places] for places in held], dtype=bool)
-
-    def _mask(self, bricks: int, robot: int, place: int) -> int:
-        """Return the postures of a robot at a place that hit nothing, as bits of a number."""
-        key = (bricks, robot, place)
-        if key not in self._options:
-            standing = self._placed[:bricks]
-            rows = [row for row in self._rows[robot, place].tolist() if row >= 0]
-            clear = (row for row in rows if not self._table.hits[row, standing].any())
-            self._options[key] = sum(1 << row for row in clear)
-        return self._options[key]
 
     def _fit(self, masks: Sequence[int]) -> bool:
         """Return whether there is a posture in each set that goes with those in the others."""

@@ -423,7 +423,7 @@ def _held_nodes(
     count = len(system.load) // 6
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
-    rigid, far = ~compliance.compliant(1, len(columns))[0], compliance.offsets(1, len(columns))[0]
+    rigid, far = ~compliance.compliant(1, len(columns))[0], compliance.offsets(len(columns))
     nodes = network.node_position[network.inner.ravel()[columns]]
     for body in np.unique(columns[rigid] // 2):
         mine = rigid & (columns // 2 == body)

@@ -240,9 +240,9 @@ class GripCompliance(FrozenValue):
         matrix = None if self.matrix is None else self.matrix[which]
         return replace(self, moved=moved, matrix=matrix)
 
-    def offsets(self, sets: int, grips: int) -> Floats:
-        """Return how far the grips are moved (S, r, 3)."""
-        return np.zeros((sets, grips, 3)) if self.moved is None else self.moved
+    def offsets(self, grips: int) -> Floats:
+        """Return how far the grips of one set are moved (r, 3)."""
+        return np.zeros((grips, 3)) if self.moved is None else self.moved[0]
 
     def compliant(self, sets: int, grips: int) -> Bools:
         """Return which grips (S, r) are compliant to forces."""
@@ -250,11 +250,11 @@ class GripCompliance(FrozenValue):
             return np.zeros((sets, grips), dtype=bool)
         return np.asarray(self.matrix[..., :3, :3].any(axis=(2, 3)))
 
-    def transmits(self, sets: int, grips: int) -> Bools:
-        """Return which grips (S, r) transmit moments."""
+    def transmits(self, grips: int) -> Bools:
+        """Return which grips of one set transmit moments, (r,)."""
         if self.matrix is None or self.matrix.shape[3] == 3:
-            return np.zeros((sets, grips), dtype=bool)
-        return np.isfinite(self.matrix[..., 5, 5])
+            return np.zeros(grips, dtype=bool)
+        return np.isfinite(self.matrix[0, :, 5, 5])
 
     @property
     def transmitted(self) -> Floats:
@@ -349,8 +349,8 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[_GripSpring]:
     """Return the compliant ones of the grips of one set, in space."""
     if compliance.matrix is None:
         return []
-    yields, turns = compliance.compliant(1, grips)[0], compliance.transmits(1, grips)[0]
-    matrix, offset = compliance.matrix[0], compliance.offsets(1, grips)[0]
+    yields, turns = compliance.compliant(1, grips)[0], compliance.transmits(grips)
+    matrix, offset = compliance.matrix[0], compliance.offsets(grips)
     out = []
     for grip in range(grips):
         ways = [way for way in range(6) if (yields[grip] if way < 3 else turns[grip])]

@@ -179,8 +179,7 @@ class GripSets:
 
     ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
     that are wanted; ``resources``: who solves them; ``screen``: whether six digits are enough, to
-    choose by; ``loose``: whether responses of mechanisms are infinite instead of raising a
-    `MechanismError`; ``work``: that is known to come, as `seqopt.responses._grip_sets.work` has it.
+    choose by. Responses of mechanisms are infinite.
 
     >>> import numpy as np
     >>> import seqopt
@@ -198,11 +197,9 @@ class GripSets:
         resources: Resources = HERE,
         *,
         screen: bool = False,
-        loose: bool = True,
-        work: float = 0.0,
     ) -> None:
         self._engine, self._resources, self._screen = engine, resources, screen
-        self.names, self._known, self._work, self._loose = tuple(names), KnownRows(), work, loose
+        self.names, self._known, self._work = tuple(names), KnownRows(), 0.0
         scene = engine.network.scene
         nodes = np.array([node for brick in scene.placed for node in brick.nodes])
         kinds = [k * scene.grip_kinds.span for k in range(len(scene.grip_kinds.turns))]
@@ -254,7 +251,7 @@ class GripSets:
 
         def solve(new: Ints) -> Floats:
             sets = self._block(bricks, every[new])
-            return solve_sets(self._engine, sets, self._resources, loose=self._loose)
+            return solve_sets(self._engine, sets, self._resources)
 
         return self._known.of((bricks, every.shape[1]), self._codes(every), solve)
 
@@ -271,12 +268,10 @@ class GripSets:
         return Block(bricks, grips, self.names, self._screen, props, self._work >= COMPILED)
 
 
-def solve_sets(
-    engine: Engine, sets: Block, resources: Resources = HERE, *, loose: bool = True
-) -> Floats:
+def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floats:
     """Return responses and grip forces (S, R + r) of grip sets of one brick count, SI units.
 
-    ``loose``: as of `GripSets`. Raises `SolverError`, `WorkerError`.
+    Infinite of mechanisms. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
@@ -292,28 +287,25 @@ def solve_sets(
 
     rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
     with hire(own.executor, own.workers) as crew:
-        task = partial(_answer, engine if crew is None else packed(engine), loose=loose)
+        task = partial(_answer, engine if crew is None else packed(engine))
         with closing(map_ordered(task, parts, crew, done)) as answers:
             rows += [found for found, _ in answers]
     return np.concatenate(rows)
 
 
-def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> tuple[Floats, int]:
+def _answer(engine: Engine | bytes, block: Block) -> tuple[Floats, int]:
     """Return what `answer` does, and how many sets the engine had to correct.
 
-    ``loose``: infinite for mechanisms, which are isolated by bisection.
+    Mechanisms are isolated by bisection: their rows are infinite.
     """
     engine, count = unpacked(engine), len(block.grips)
     before = getattr(engine, "corrected", 0)
-    try:
+    with suppress(MechanismError):
         return answer(engine, block), getattr(engine, "corrected", 0) - before
-    except MechanismError:
-        if not loose:
-            raise
     if count == 1:
         return np.full((1, len(block.names) + block.grips.shape[1]), np.inf), 0
     halves = block.grips[: count // 2], block.grips[count // 2 :]
-    parts = [_answer(engine, replace(block, grips=half), loose=True) for half in halves]
+    parts = [_answer(engine, replace(block, grips=half)) for half in halves]
     return np.concatenate([rows for rows, _ in parts]), sum(corrected for _, corrected in parts)
 
 

@@ -297,15 +297,13 @@ def each_stability(
     steps: Sequence[Step],
     mortar: Mortar,
     margins: tuple[str, ...] = (),
-    at: Collection[int] | None = None,
     shared: tuple[Executor | None, int] = (None, 1),
 ) -> Iterator[Stability]:
     """Yield what `assess_steps` returns, as soon as it is found.
 
-    ``at``: numbers of steps with margins, by default all; ``shared``: executor and workers.
+    ``shared``: executor and workers.
     """
-    numbers = {step.number for step in steps} if at is None else at
-    find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
+    find = partial(_each, mortar=mortar, margins=margins)
     parts = parts_of(network, steps)
     with hire(*shared) as crew:
         if crew is None:
@@ -322,16 +320,12 @@ def _in_worker(parts: bytes, find: _Find, steps: Sequence[Step]) -> tuple[Stabil
 
 
 def _each(
-    parts: PartialAssemblies,
-    steps: Sequence[Step],
-    mortar: Mortar,
-    margins: tuple[str, ...],
-    at: Collection[int],
+    parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, margins: tuple[str, ...]
 ) -> Iterator[Stability]:
-    """Yield the verdicts of steps, with margins of those whose numbers are given."""
+    """Yield the verdicts of steps, with margins if any are asked for."""
     up = parts.network.scene.up
     for step, found in zip(steps, each_verdict(parts, steps, mortar), strict=True):
-        if step.number not in at or not step.bricks:
+        if not margins or not step.bricks:
             yield found
             continue
         whole = assess(parts(step.bricks, step.grips), mortar, up, margins=margins)

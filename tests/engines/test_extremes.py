@@ -14,7 +14,7 @@ from seqopt.engines.registry import ENGINES
 from seqopt.engines.rigid import _growth
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine, _can_compile, _extremes_in
+from seqopt.engines.rigid.compliance import COMPILES, ComplianceEngine, _extremes_in
 from seqopt.errors import GripError
 from seqopt.network.network import build_network
 from seqopt.responses._grip_sets import Block, answer
@@ -25,7 +25,7 @@ from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arc
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened
 
-needs_numba = pytest.mark.skipif(not _can_compile(), reason="no numba")
+needs_numba = pytest.mark.skipif(not COMPILES, reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 CLOSE = 1e-12  # of what is largest
@@ -158,7 +158,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
 
 
 def test_without_numba_fields_answer(monkeypatch):
-    monkeypatch.setattr("seqopt.engines.rigid.compliance._can_compile", lambda: False)
+    monkeypatch.setattr("seqopt.engines.rigid.compliance.COMPILES", False)
     monkeypatch.setitem(sys.modules, "seqopt.engines.rigid._extremes", None)  # not imported
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = sets_of(engine.network, 6, 2, 10)

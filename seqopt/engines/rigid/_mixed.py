@@ -184,7 +184,7 @@ def free_motion(
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
-    turned = columns[compliance.transmits(1, len(columns))[0]] // 2
+    turned = columns[compliance.transmits(len(columns))] // 2
     turns = (6 * turned[:, None] + np.arange(3, 6)).ravel()  # that grips resist
     resisted = np.zeros((len(turns), 6 * bricks))
     resisted[np.arange(len(turns)), turns] = 1.0
@@ -374,7 +374,7 @@ def _with_flexibility(
     those of moments, over the lever.
     """
     network, count = parts.network, len(grips)
-    yields, turns = compliance.compliant(1, count)[0], compliance.transmits(1, count)[0]
+    yields, turns = compliance.compliant(1, count)[0], compliance.transmits(count)
     own = compliance.transmitted[0]
     width = own.shape[2]
     between = []

@@ -13,7 +13,7 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cached_property
 from importlib.util import find_spec
 from math import prod
 from typing import TYPE_CHECKING, NamedTuple
@@ -71,6 +71,7 @@ _LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on block
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # largest error, as `ACCURACY`, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
+COMPILES = find_spec("numba") is not None  # whether loops can be compiled
 
 
 class _FastSolution:
@@ -179,12 +180,6 @@ def _squared(vectors: Floats) -> Floats:
     return np.asarray(np.einsum("snk,snk->sn", vectors, vectors))
 
 
-@cache
-def _can_compile() -> bool:
-    """Return whether loops can be compiled: numba is there."""
-    return find_spec("numba") is not None
-
-
 class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
@@ -250,7 +245,7 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self.network, columns, numbers, None)
-        if not compiled or not compliance.rigid or not _can_compile():
+        if not (compiled and compliance.rigid and COMPILES):
             fields = self._found(bricks, columns, compliance, want)
             return _extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
