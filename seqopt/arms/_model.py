@@ -190,8 +190,11 @@ class ArmModel:
             raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
         self.arm, path = arm, model_path(arm)
         self.model, geometry = _read(path, arm)
-        self.data = self.model.createData()
+        self.data, self.joints = self.model.createData(), int(self.model.nq)
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
+        # from every joint, and first the root, to the next one, and last to the flange, m
+        ends = [*[*self.model.jointPlacements][1:], self.model.frames[self.flange].placement]
+        self._lengths = [float(np.linalg.norm(end.translation)) for end in ends]
         x, y = np.array(arm.x_axis), np.array(arm.y_axis)
         self.base = pin.SE3(np.column_stack([x, y, np.cross(x, y)]), np.array(arm.position))
         bodies = [*_bodies(self.model, geometry)]
@@ -222,12 +225,6 @@ class ArmModel:
                     f"arm: {path} has no shape of {', '.join(names)}, neither <collision> nor "
                     "<visual>, so nothing says what it hits; give it one"
                 )
-
-    @cached_property
-    def _lengths(self) -> list[float]:
-        """From every joint, and first the root, to the next one, and last to the flange, m."""
-        ends = [*[*self.model.jointPlacements][1:], self.model.frames[self.flange].placement]
-        return [float(np.linalg.norm(end.translation)) for end in ends]
 
     @cached_property
     def span(self) -> float:
@@ -263,11 +260,6 @@ class ArmModel:
             *(f"link {b.name} {SAYS}{tool * (b.name in beyond)}" for b in bodies),
             f"tool {SAYS}",
         )
-
-    @property
-    def joints(self) -> int:
-        """How many joints move it."""
-        return int(self.model.nq)
 
     def draw(self, draws: np.random.Generator, count: int) -> Floats:
         """Return postures (count, joints) within its limits, drawn at random."""
@@ -403,9 +395,10 @@ class PosedArm:
         Of the foot the last point is there twice: there is no tool.
         """
         model = arm_model(self.arm)
-        axes, flange = model.flange_pose(self._own)
+        own = np.asarray(self.joints)[: model.joints]
+        axes, flange = model.flange_pose(own)
         data, root = model.data, model.base.translation
-        pin.forwardKinematics(model.model, data, self._own)
+        pin.forwardKinematics(model.model, data, own)
         joints = [model.base.act(data.oMi[j].translation) for j in range(1, model.model.njoints)]
         points = [root, *joints, flange, flange + self.arm.tool_length * axes[:, 2]]
         far = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME
@@ -426,17 +419,14 @@ class PosedArm:
         ]
         if not self.holds:
             return tuple(out)
-        placed = model.placed(self._own[None], np.array([self.arm.tool_length]))
+        own = np.asarray(self.joints)[None, : model.joints]
+        placed = model.placed(own, np.array([self.arm.tool_length]))
         angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
         ring = self.arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
         end = np.array([0.0, 0.0, 0.5 * self.arm.tool_length])
         local = [*(body.points for body in model.moving), np.concatenate([ring - end, ring + end])]
         moved = zip(local, placed.rotation[0], placed.shift[0], strict=True)
         return (*out, *(points @ turn.T + shift for points, turn, shift in moved))
-
-    @property
-    def _own(self) -> Floats:
-        return np.asarray(self.joints)[: arm_model(self.arm).joints]
 
 
 def idle_arm(arm: Arm) -> PosedArm:

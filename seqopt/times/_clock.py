@@ -252,7 +252,8 @@ class TimedRows:
         self._rows = rows.astype(np.int64)
         self._cured: CuringStates | None = None
         standing, begin = problem.standing, problem.rules.begin
-        if standing is not None and standing.curing is not None:
+        self.cures = standing is not None and standing.curing is not None
+        if standing is not None and self.cures:
             counts = [tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
             bricks, floors = np.array(counts), Floors(problem.network, standing, motions)
             grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
@@ -266,11 +267,6 @@ class TimedRows:
         slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
         at = [scene.node_position(node) for node in tables.nodes[1:].tolist()]
         self._team = Team(times, slow, tables.groups, np.array([(0.0,) * 3, *at]), problem.parks)
-
-    @property
-    def cures(self) -> bool:
-        """Whether mortar cures."""
-        return self._cured is not None
 
     def acts(self, graph: Graph) -> Acts:
         """Return who may act in the moves of a graph of these states, and for how long."""

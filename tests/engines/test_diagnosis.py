@@ -605,5 +605,5 @@ def test_the_last_brick_count_but_one_is_recalled():
         for name in ("flexibility", "dead_displacement", "twist", "wrench", "loss"):
             a, b = (getattr(each, name) for each in (found, fresh))
             assert np.abs(a - b).max() <= 1e-11 * np.abs(b).max(), name
-    assert builder.operator(total - 2, held).bricks == total - 2
+    assert builder.operator(total - 2, held).maps.bricks == total - 2
     assert builder.growth.bricks == total - 2

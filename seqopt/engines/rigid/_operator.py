@@ -174,11 +174,6 @@ class ComplianceOperator(FrozenValue):
     moments: int = 0  # of each brick that is loaded
 
     @property
-    def bricks(self) -> int:
-        """How many stand, b."""
-        return self.maps.bricks
-
-    @property
     def width(self) -> int:
         """How many unknowns each grip has: forces, and then moments."""
         return 3 + self.moments
@@ -197,7 +192,7 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def place(self) -> Ints:
         """Which of the bricks that are loaded each is, (b,); -1 of one that is not."""
-        out = np.full(self.bricks, -1)
+        out = np.full(self.maps.bricks, -1)
         out[self.held] = np.arange(len(self.held))
         return frozen(out)
 
@@ -215,7 +210,9 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def doubts(self) -> Doubts:
         """What rounding may leave of the answers to its loads."""
-        return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
+        own = np.arange(len(self.flexibility))
+        diagonal = self.flexibility[own, own % self.flexibility.shape[1]]
+        return Doubts(diagonal, self.dead_displacement, self.loss)
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
@@ -224,10 +221,6 @@ class ComplianceOperator(FrozenValue):
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return rows
-
-    def entries(self, rows: Ints) -> Ints:
-        """Return where the flexibility has entries of loads (k, S), (k, k, S)."""
-        return np.asarray(rows[:, None] * len(self.flexibility) + rows)
 
     def weight_rows(self, index: Ints) -> Ints | int:
         """Return which row is the weight, of sets with loads (S, k)."""
@@ -249,7 +242,7 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches determine.
         """
-        few = are_few(3 * self.bricks, len(index))  # independent of earlier requests
+        few = are_few(3 * self.maps.bricks, len(index))  # independent of earlier requests
         loads = self.loads(index, force)
         return {
             name: np.asarray(loads @ self.of_loads(name))
@@ -549,9 +542,9 @@ def undone(
     """
     count, sets = rows.shape
     system = np.empty((count + 1, count, sets))
-    operator.flexibility.take(
-        operator.entries(rows), out=system[:count], mode="clip"
-    )  # others copy once more
+    loads = operator.flexibility.shape[1]  # of several scenarios, those of each stand apart
+    entries = rows[:, None] * loads + rows % loads
+    operator.flexibility.take(entries, out=system[:count], mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     nodes = count - operator.loose
