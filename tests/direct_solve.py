@@ -77,7 +77,8 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     wrench[parts.acting] += np.einsum("sij,sj->si", parts.stiffness, moved)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
-    solution = Solution(twist[None], wrench[None], force[None])
+    rigid = np.zeros((1, len(grips)), dtype=bool)
+    solution = Solution(twist[None], wrench[None], force[None], 0 * force[None], rigid)
     return respond(network, parts.motion, grips[None], solution)
 
 

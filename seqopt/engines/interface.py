@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network, network_of
-from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
 
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
@@ -72,12 +71,7 @@ class Fields(FrozenValue):
     support: Floats
     joint_wrench: Floats
     brick_twist: Floats
-    grip_moment: Floats = None  # type: ignore[assignment]  # zero where none is given
-
-    def __post_init__(self) -> None:
-        if self.grip_moment is None:
-            settle(self, grip_moment=np.zeros_like(self.grip_force))
-        super().__post_init__()
+    grip_moment: Floats
 
 
 def linear_limit(scene: Scene) -> float:
@@ -388,7 +382,8 @@ def no_sets(network: Network, bricks: int, held: int, *, sets: int = 0) -> Field
     """
     counts = _counts_of_fields(network, bricks)
     empty = {name: np.zeros((sets, count, *SHAPES[name])) for name, count in counts.items()}
-    return Fields(grip_force=np.zeros((sets, held, 3)), **empty)
+    none = np.zeros((sets, held, 3))
+    return Fields(grip_force=none, grip_moment=none.copy(), **empty)
 
 
 def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:

@@ -36,7 +36,6 @@ from seqopt.network._mechanics import (
     spread,
 )
 from seqopt.network.network import Network
-from seqopt.scene._checks import settle
 from seqopt.work import one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
@@ -238,13 +237,8 @@ class Solution(FrozenValue):
     twist: Floats
     wrench: Floats
     force: Floats
-    moment: Floats = None  # type: ignore[assignment]  # none where none is given
-    compliant: Bools | None = None
-
-    def __post_init__(self) -> None:
-        if self.moment is None:
-            settle(self, moment=np.zeros_like(self.force))
-        super().__post_init__()
+    moment: Floats
+    compliant: Bools
 
 
 def respond(
@@ -290,13 +284,12 @@ def reactions(network: Network, wrench: Floats) -> Floats:
 
 
 def split_pairs(
-    network: Network, columns: Ints, force: Floats, carried: Floats, compliant: Bools | None = None
+    network: Network, columns: Ints, force: Floats, carried: Floats, compliant: Bools
 ) -> None:
     """Let each of two rigid grips on one brick take the force at its own node, in place.
 
     ``force`` (S, r, 3), ``carried`` (S, E): of grips and edges; ``compliant`` (S, r): soft grips.
     """
-    compliant = np.zeros(columns.shape, dtype=bool) if compliant is None else compliant
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
     edge_of[network.edge_brick[inner]] = inner
@@ -516,9 +509,7 @@ def _corrected(
     return result, bool(unchanged(parts, state, changes, _SENSITIVE).all())
 
 
-def borne(
-    force: Floats, grips: int, compliance: GripCompliance
-) -> tuple[Floats, Floats, Bools | None]:
+def borne(force: Floats, grips: int, compliance: GripCompliance) -> tuple[Floats, Floats, Bools]:
     """Return forces, N, and moments, N m, of grips (S, r, 3), and which are compliant.
 
     ``force`` (S, rw): of each grip, then its moments over the lever if grips transmit any.
