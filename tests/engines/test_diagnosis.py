@@ -254,7 +254,7 @@ def test_who_looks_for_what_cancels(monkeypatch, kind, share, uneven):
     """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
     scene, looked = from_both_sides(7), []
     monkeypatch.setattr(
-        trial, "_cancels", lambda *seen: looked.append(seen[0].bricks) or _cancels(*seen)
+        trial, "_cancels", lambda *seen: looked.append(seen[0].maps.bricks) or _cancels(*seen)
     )
     stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
     grounds = tuple(replace(g, **stiff) for g in scene.grounds)
