@@ -16,7 +16,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import NothingFoundError, TimeUpError
 from seqopt.graph.formulation import Solution, Watch
 from seqopt.problem.criteria import Criterion, Ranked, RankSum, state_costs
-from seqopt.work import keep
+from seqopt.work import _keep
 
 if TYPE_CHECKING:
     from seqopt.sequence._space import Candidates
@@ -112,7 +112,7 @@ def walk(problem: Any, watch: Watch) -> Solution:
     space, resources = problem.space, problem.resources
     path, state = list[tuple[int, ...]](), space.start()
     try:
-        with keep(resources.executor, resources.workers):
+        with _keep(resources.executor, resources.workers):
             while len(path) < space.levels:
                 if watch.over:
                     raise TimeUpError(f"{watch.seconds:.3g} s: {_so_far(problem, path)}; give more")

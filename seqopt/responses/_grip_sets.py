@@ -37,7 +37,7 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.sequence.steps import Step
-from seqopt.work import Progress, Tell, hire, map_ordered, one_thread
+from seqopt.work import Progress, Tell, _one_thread, hire, map_ordered
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
@@ -131,16 +131,16 @@ def answer(engine: Engine, block: Block) -> Floats:
     """
     (grips, want), robots = block.asked(), block.grips.shape[1]
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
-        with one_thread():
+        with _one_thread():
             return block.rows(engine._extremes(block.bricks, grips, want, compiled=block.compiled))
-    with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
+    with _one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
     network, bricks = engine.network, block.bricks
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     if TOLERANCE in block.names:
-        with one_thread():
+        with _one_thread():
             values[TOLERANCE] = misfits(engine, bricks, grips)
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
@@ -333,7 +333,7 @@ class ScenarioSets:
         if not able or not stacked.fits(block.bricks):
             return {}
         out = dict[int, Floats]()
-        with suppress(MechanismError), one_thread():  # which sets are loose is found one by one
+        with suppress(MechanismError), _one_thread():  # which sets are loose is found one by one
             each = stacked.extremes(parts, block.bricks, grips, want)
             out |= {k: block.rows(found) for k, found in zip(parts, each, strict=True)}
         return out

@@ -53,7 +53,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.work import Tell, hire, map_ordered, one_thread, with_progress
+from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
@@ -121,7 +121,7 @@ class VerdictChain:
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = bonded(assembly, self._mortar)
-        with one_thread():
+        with _one_thread():
             tries = chain(self._known(assembly, held), self._sought(assembly, case))
             each = ((judged(assembly, case, answer), way) for answer, way in tries)
             known = next(((proven, way) for proven, way in each if proven is not None), None)

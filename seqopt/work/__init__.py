@@ -65,7 +65,7 @@ _GROUPS = (
 )  # what a container may have, and has
 
 
-def free_memory() -> float:
+def _free_memory() -> float:
     """Return how many bytes can still be had, infinite where the system does not say."""
     free = math.inf
     if _MEMORY.exists():
@@ -89,7 +89,7 @@ def free_memory() -> float:
 _BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
 
 
-def one_thread() -> AbstractContextManager[object]:
+def _one_thread() -> AbstractContextManager[object]:
     """Return a context in which BLAS uses one thread; on leaving, it uses as many as before.
 
     The matrices of a partial structure are small enough for one core. Threads that share them spend
@@ -101,7 +101,7 @@ def one_thread() -> AbstractContextManager[object]:
 
 
 @cache
-def cores() -> int:
+def _cores() -> int:
     """Return on how many cores this process may work: one where it is one of several workers."""
     if parent_process() is not None:
         return 1
@@ -109,7 +109,7 @@ def cores() -> int:
     return len(known(0)) if known else os.cpu_count() or 1
 
 
-def in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
+def _in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
     """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
     first, *others = tasks
     if not others:
@@ -122,7 +122,7 @@ def in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> 
 @cache
 def _libraries() -> ThreadpoolController:
     """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
-    free = free_memory()
+    free = _free_memory()
     if free < _BUFFERS:
         raise MemoryShortError(
             f"linear algebra takes buffers of {_BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
@@ -238,7 +238,7 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
 
 
 @contextmanager
-def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
+def _keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
     """Hire workers once for all who `hire` some within a with block."""
     with hire(executor, workers) as crew:
         before = _KEPT.set(crew)
@@ -454,7 +454,7 @@ _ENDS = tuple(
 
 
 @contextmanager
-def answered(told: Callable[[], object]) -> Iterator[None]:
+def _answered(told: Callable[[], object]) -> Iterator[None]:
     """Answer the first termination signal by a call; a second one is handled as before.
 
     Signals with foreign handlers are left to these. The call runs between two instructions of the
@@ -479,7 +479,7 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
         give_back()
 
 
-def interrupt_main() -> None:
+def _interrupt_main() -> None:
     """Interrupt the main thread like ctrl-C, from any other thread, also while it waits."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main:
@@ -489,7 +489,7 @@ def interrupt_main() -> None:
 
 
 @contextmanager
-def ending(seconds: float) -> Iterator[None]:
+def _ending(seconds: float) -> Iterator[None]:
     """Raise `TimeoutError` between two instructions of a block that exceeds its time limit.
 
     In the main thread only; in others there is no limit.
@@ -503,7 +503,7 @@ def ending(seconds: float) -> Iterator[None]:
 
     def end() -> None:
         over.set()
-        interrupt_main()
+        _interrupt_main()
 
     def end_only(*_: object) -> None:
         if over.is_set():
@@ -559,7 +559,7 @@ class Clock:
     def needed(self, what: str) -> Iterator[None]:
         """End a block in time without which there is no answer; `TimeUpError` says what it was."""
         try:
-            with ending(self._end + GRACE - time.perf_counter()):
+            with _ending(self._end + GRACE - time.perf_counter()):
                 yield
         except TimeoutError:
             raise TimeUpError(f"{what} takes longer; give more") from None
@@ -567,7 +567,7 @@ class Clock:
     def tried(self, work: Callable[[], _Result]) -> tuple[_Result | None, str]:
         """Return what some work finds, or None and why it ended early: `TIME` or `INTERRUPT`."""
         try:
-            with ending(self._end + GRACE - time.perf_counter()):
+            with _ending(self._end + GRACE - time.perf_counter()):
                 return work(), ""
         except TimeoutError:
             return None, TIME

@@ -20,7 +20,7 @@ from seqopt.network.network import build_network
 from seqopt.responses._grip_sets import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
-from seqopt.work import one_thread
+from seqopt.work import _one_thread
 from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arch
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened
@@ -118,7 +118,7 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
     sets, found = sets_of(network, 60, 3), []
     for threads in (1, 3):
         for module in ("_extremes", "_growth"):
-            name = f"seqopt.engines.rigid.{module}.cores"
+            name = f"seqopt.engines.rigid.{module}._cores"
             monkeypatch.setattr(name, lambda threads=threads: threads)
         monkeypatch.setattr(_growth, "_AT_ONCE", 2**12)
         engine = ComplianceEngine(network)
@@ -183,10 +183,10 @@ def two_threads():
 
 
 def test_one_thread_inside_and_two_after(two_threads):
-    with one_thread():
+    with _one_thread():
         assert threads() == {1}
     assert threads() == {2}
-    with pytest.raises(ZeroDivisionError), one_thread():
+    with pytest.raises(ZeroDivisionError), _one_thread():
         _ = 1 / 0
     assert threads() == {2}
 

@@ -44,7 +44,7 @@ from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import SCHEDULES, sequential, three_robot_loop
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study import EQUATIONS, WORST_RATIO
-from seqopt.work import keep
+from seqopt.work import _keep
 from seqopt.workflow import optimize
 from tests.builders import running_bond, six_bricks
 
@@ -58,7 +58,7 @@ def evaluated(engine, schedule, **resources):
     graph = graph_of(posed)
     levels = [k for k in range(1, graph.space.levels + 1) if graph.space.open_columns(k)]
     states = {level: graph.space.candidates(level).states for level in levels}
-    with keep(graph.resources.executor, graph.resources.workers):
+    with _keep(graph.resources.executor, graph.resources.workers):
         return graph, {k: graph.seen(k, rows).responses for k, rows in states.items()}
 
 

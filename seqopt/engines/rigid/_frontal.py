@@ -44,7 +44,7 @@ from seqopt.engines.rigid._mixed import (
 from seqopt.engines.rigid._operator import ResponseMaps, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
-from seqopt.work import one_thread
+from seqopt.work import _one_thread
 
 AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
 _SHRINKING = 1e-4  # largest correction from which on the next ones are foreseen
@@ -211,7 +211,7 @@ class FrontalSystem:
             self._last = parts, ResponseMaps(self._maps, bricks).motion
         parts, motion = self._last
         answers = [no_sets(network, bricks, columns.shape[1])]
-        with one_thread():
+        with _one_thread():
             self._factor.reach(bricks)
             for i, held in enumerate(columns):
                 own = compliance.select(slice(i, i + 1))

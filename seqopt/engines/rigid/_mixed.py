@@ -36,7 +36,7 @@ from seqopt.network._mechanics import (
     spread,
 )
 from seqopt.network.network import Network
-from seqopt.work import one_thread
+from seqopt.work import _one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
@@ -189,7 +189,7 @@ def free_motion(
     resisted[np.arange(len(turns)), turns] = 1.0
     held = np.vstack([parts.motion[node.ravel()].toarray(), resisted]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
-    with one_thread():
+    with _one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
     if len(sizes) == ties.shape[1] and sizes[-1] > _UNTIED * sizes[0]:
         return None

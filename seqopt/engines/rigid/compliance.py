@@ -51,7 +51,7 @@ from seqopt.engines.rigid._operator import (
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work import one_thread
+from seqopt.work import _one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes
@@ -279,7 +279,7 @@ class ComplianceEngine(NamedEngine):
             taken = sum(each.nbytes for each in self._kept.values())
             while taken > _KEPT:  # those that were not asked for longest go
                 taken -= self._kept.pop(next(iter(self._kept))).nbytes
-            with one_thread():
+            with _one_thread():
                 known = self._builder.operator(bricks, held)
         self._kept[bricks] = known
         return known
@@ -313,7 +313,7 @@ class ComplianceEngine(NamedEngine):
         self.corrected += len(columns)
         tied = bricks <= len(self._tree.spring)  # the tree that operators grow on reaches them all
         operator = self._operator(bricks, columns) if tied else None
-        with one_thread():
+        with _one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 self._refinement = _REFINEMENT.Refinement(self.network, bricks, tied=tied)
             last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
