@@ -29,8 +29,7 @@ from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import Best, distances, lexicographic, reached, strictly_below, tied
 from seqopt.graph.space import Explorer, Key, Space, Visited
 from seqopt.graph.states import States
-from seqopt.work._workers import free_memory
-from seqopt.work.progress import Stage, Tell
+from seqopt.work import Stage, Tell, _free_memory
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
@@ -69,7 +68,7 @@ def watched(problem: States, watch: Watch, progress: Tell) -> Watching:
             raise StopError("memory")
         if used > GROWN * asked:
             asked = used
-            if used > free_memory() + found.nbytes:
+            if used > _free_memory() + found.nbytes:
                 raise StopError("memory")
 
     return tell

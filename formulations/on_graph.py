@@ -57,7 +57,7 @@ from seqopt.graph.graph import (
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
-from seqopt.work.progress import Tell, answered
+from seqopt.work import Tell, _answered
 
 _Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
 STEPS = 400  # weights that are tried at most
@@ -195,7 +195,7 @@ def chosen(
             own = [problem.candidates.charges(level, rows) for level, _, rows in states]
             graph = replace(graph, alone=np.concatenate(own)[graph.target])
         short = _decisions(problem, graph)
-        with answered(watch.interrupt):
+        with _answered(watch.interrupt):
             best = choose(short.graph, watch)
     except (StopError, KeyboardInterrupt) as stop:
         return plan_by_then(first, stop)

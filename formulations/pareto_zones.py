@@ -25,7 +25,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch
 from seqopt.plan.front import FrontProblem
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def solve(

@@ -43,7 +43,7 @@ from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
 from seqopt.stability.standing import Standing
 from seqopt.study import CRITERIA, PUBLISHED, is_reference_arch, published_plan
-from seqopt.work.progress import Clock, Tell
+from seqopt.work import Clock, Tell
 from seqopt.workflow import Search, optimize, parse_numbers, pose_build
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Site, StepKind
 from seqopt.stability.standing import Standing
 from seqopt.study import EQUATIONS, find_criterion
-from seqopt.work.progress import Clock, Tell
+from seqopt.work import Clock, Tell
 
 if TYPE_CHECKING:
     from seqopt.scene.scenarios import Scenarios

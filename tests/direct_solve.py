@@ -10,7 +10,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, no_sets
 from seqopt.engines.rigid._mixed import Solution, require_resistance, respond
 from seqopt.errors import SolverError
-from seqopt.network._mechanics import Statics, build_statics, node_motion
+from seqopt.network._mechanics import node_motion
 from seqopt.network.network import Network
 
 _ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
@@ -27,7 +27,6 @@ class RigidStructure:
     matrix: Floats  # (6b, 6b); stiffness of the structure without grips
     motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
     inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
-    statics: Statics  # of the network
 
 
 def solve_dense(
@@ -42,11 +41,11 @@ def solve_dense(
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
     motion = node_motion(network, bricks).toarray()
     inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
-    statics = build_statics(network)
-    parts = RigidStructure(acting, gap, stiffness, matrix, motion, inner, statics)
+    parts = RigidStructure(acting, gap, stiffness, matrix, motion, inner)
     if compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = compliance.offsets(*columns.shape)
+    none = np.zeros((*columns.shape, 3))
+    far = none if compliance.moved is None else compliance.moved
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return _join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
@@ -78,8 +77,9 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: 
     wrench[parts.acting] += np.einsum("sij,sj->si", parts.stiffness, moved)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
-    solution = Solution(twist[None], wrench[None], force[None])
-    return respond(network, parts.statics, parts.motion, grips[None], solution)
+    rigid = np.zeros((1, len(grips)), dtype=bool)
+    solution = Solution(twist[None], wrench[None], force[None], 0 * force[None], rigid)
+    return respond(network, parts.motion, grips[None], solution)
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:

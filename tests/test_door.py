@@ -32,7 +32,7 @@ LIGHT = ("numpy", "pandas", "scipy", "networkx")
 LATE = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
 SELDOM = (
     *("scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
-    *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
+    *("seqopt.arms._tables", "seqopt.engines.discrete", "seqopt.engines.frame"),
     *("seqopt.engines.rigid._refinement", "seqopt.graph._spaces"),
     *("seqopt.plan._answers", "seqopt.judge._proof", "seqopt.scene.library"),
     "seqopt.sequence._space",

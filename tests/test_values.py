@@ -13,7 +13,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import face_quadrature, find_elastic_limits
 from seqopt.engines.diagnosis import diagnose
-from seqopt.engines.discrete.engine import _build_system, _held_nodes, _settle
+from seqopt.engines.discrete import _build_system, _held_nodes, _settle
 from seqopt.engines.interface import RIGID, Want, read_compliance
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped_system
@@ -44,6 +44,7 @@ def values(arch25):
     held = _held_nodes(network, system, grips, RIGID, [])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, seqopt.EPOXY))
+    none = np.zeros((0, 3)), np.zeros((0, 3))
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     cube = box((1, 1, 1))
     ((_, touching),) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
@@ -56,7 +57,8 @@ def values(arch25):
         *(tree, operator, StackedOperator.of([operator, operator]), operator.doubts, parts),
         share(network),
         mixed_system(parts, grips),
-        *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points),
+        Solution(np.zeros(6), np.zeros((1, 6)), *none, np.zeros(0, dtype=bool)),
+        *(system, system.points),
         *(_settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, seqopt.EPOXY)),
         *(load_factor(assembly, seqopt.EPOXY), arch25.grip_kinds),

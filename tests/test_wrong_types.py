@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.registry import AutoEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine

@@ -31,7 +31,7 @@ from experiments.harness.results import best, drawn, two
 from experiments.harness.scenes import arch25
 from seqopt import DRY, Scene, build_network, sequential
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import AutoEngine

@@ -24,7 +24,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from seqopt import DRY, Network, Step
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError

@@ -148,7 +148,11 @@ class InTime(Carried):
         after = np.maximum(after, end[:, None] - timed.longest)
         after = np.where(timed.graph.ends[state][:, None], end[:, None], after)  # it is over
         after[origin == HELD] = 0.0
-        self._sort_alike(state, after)
+        columns = range(after.shape[1] - 1)
+        for column in [*columns] * len(columns) if self._sorts else ():  # robots that are alike
+            swap = timed.alike[state, column] & (after[:, column] > after[:, column + 1])
+            rows, pair = np.flatnonzero(swap)[:, None], [column, column + 1]
+            after[rows, pair] = after[rows, pair[::-1]]
         return np.column_stack([end, after, placed])
 
     def _cured(
@@ -171,16 +175,6 @@ class InTime(Carried):
         stands = np.arange(placed.shape[1]) < curing.bricks[state][:, None]
         over = self._timed.graph.ends[state][:, None]
         return start, np.where(stands & ~over, older, 0.0)
-
-    def _sort_alike(self, state: Ints, since: Floats) -> None:
-        """Sort the readiness of columns that could change places, in place."""
-        for _ in range(since.shape[1] - 1 if self._sorts else 0):
-            for column in range(since.shape[1] - 1):
-                swap = self._timed.alike[state, column] & (since[:, column] > since[:, column + 1])
-                rows = np.flatnonzero(swap)
-                since[rows[:, None], [column, column + 1]] = since[
-                    rows[:, None], [column + 1, column]
-                ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,13 +32,12 @@ from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import PEAK, TIME, tied
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
-from seqopt.problem.amounts import MINMAX, SUM, Amount
-from seqopt.times._curing import CuringBuilds
-from seqopt.times._fall_cuts import FallCuts
+from seqopt.problem.amounts import MINMAX, SUM
+from seqopt.times._curing import CuringBuilds, FallCuts
 from seqopt.times._graph import timed_graph
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
 from seqopt.times._twin import makespan
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 class Soonest(NamedTuple):
@@ -110,18 +109,10 @@ def of_instance(instance: Any, least: Least, watch: Watch) -> Solution:
         found = stages.run()
     except StopError as stop:
         return plan_by_then(None, stop)
-    values = _timed_values(aims, stages.values(found.path), stages.least(found.path))
+    values = stages.values(found.path, stages.least(found.path))[: len(aims)]
     states, late = tuple((node,) for node in found.path), "time" * found.late
     proofs, bounds = tuple(found.proofs), _no_higher(found.bounds, values)
     return Solution(states, values, bounds, stopped=late, proofs=proofs)
-
-
-def _timed_values(
-    goals: Sequence[Amount], values: Sequence[float], makespan: float
-) -> tuple[float, ...]:
-    """Return the values of goals, those of makespans replaced."""
-    pairs = zip(goals, values, strict=False)
-    return tuple(makespan if goal.in_time else v for goal, v in pairs)
 
 
 def _no_higher(bounds: Sequence[float], values: tuple[float, ...]) -> tuple[float, ...]:
@@ -226,7 +217,7 @@ def _plan(
     soonest = waits.soonest(problem, states) if problem.is_timed else Soonest()
     if soonest is None:
         return None
-    values = _timed_values(problem.goals, stages.values(found.path), soonest.makespan)
+    values = stages.values(found.path, soonest.makespan)
     return Solution(
         states,
         values,
@@ -251,7 +242,8 @@ def _by_then(
     soonest = waits.soonest(problem, found.states)
     if soonest is None:
         raise TimeUpError("no plan that stands while mortar cures was found yet; give more")
-    values = _timed_values(problem.goals, found.objective, soonest.makespan)
+    pairs = zip(problem.goals, found.objective, strict=False)
+    values = tuple(soonest.makespan if goal.in_time else value for goal, value in pairs)
     for value, cap in zip(values[len(problem.aims) :], problem.budgets, strict=True):
         if value > tied(cap):
             raise TimeUpError("no plan within all budgets was found yet; give more")

@@ -62,31 +62,6 @@ class StageFound:
             raise InfeasibleError("no plan is within all budgets")
 
 
-def beams(
-    carrying: Carrying,
-    kept: Bools,
-    caps: Caps,
-    prices: Prices,
-    watch: Watch,
-    goal: int | None = None,
-) -> Swept:
-    """Return a good path within caps, by ever wider searches; none of it where none is found."""
-    best = Swept()
-    for width in BEAMS:
-        try:
-            found = carrying.sweep(kept, caps, prices, watch, width=width, goal=goal)
-        except LateError:
-            break
-        if found.best < best.best:
-            best = found
-            limit = found.best * (1 - ALMOST)
-            if goal is None:
-                caps = replace(caps, time=limit)
-        if best.path and (not found.narrow or best.best <= prices.bound * (1 + ALMOST)):
-            break
-    return best
-
-
 Least = Callable[[Carrying, StageFound, Chosen, Prices, Watch], Chosen]
 """Returns the path of least makespan by the moves and caps that are left, from a first one."""
 
@@ -167,11 +142,29 @@ class Stages:
         out[out] = _on_paths(self._graph.only(kept))
         return out
 
+    def _beams(self, kept: Bools, caps: Caps, prices: Prices, goal: int | None = None) -> Swept:
+        """Return a good path within caps, by ever wider searches; an empty one if none is found."""
+        best = Swept()
+        for width in BEAMS:
+            try:
+                found = self._carrying.sweep(
+                    kept, caps, prices, self._watch, width=width, goal=goal
+                )
+            except LateError:
+                break
+            if found.best < best.best:
+                best = found
+                if goal is None:
+                    caps = replace(caps, time=found.best * (1 - ALMOST))
+            if best.path and (not found.narrow or best.best <= prices.bound * (1 + ALMOST)):
+                break
+        return best
+
     def _makespan(self) -> None:
         """Find the least makespan; from then on it is a cap."""
         stage, carrying = self._stage, self._carrying
         prices = carrying.prices(stage.kept, self._watch)
-        swept = beams(carrying, stage.kept, stage.caps, prices, self._watch)
+        swept = self._beams(stage.kept, stage.caps, prices)
         found = Chosen(swept.path, swept.best, prices.bound)
         if found.value > prices.bound * (1 + ALMOST):
             found = self._least(carrying, stage, found, prices, self._watch)
@@ -198,7 +191,7 @@ class Stages:
                 kept = self._on_paths(stage.kept & (amounts <= levels[middle]))
                 swept = Swept()
                 if kept.any():
-                    swept = beams(self._carrying, kept, stage.caps, prices, self._watch)
+                    swept = self._beams(kept, stage.caps, prices)
                 if kept.any() and not swept.path:  # the labels that show that there is none
                     swept = self._carrying.sweep(kept, stage.caps, prices, self._watch)
                 if swept.path:
@@ -223,7 +216,7 @@ class Stages:
         labels: tuple[Labels, ...] = ()
         bound = -np.inf
         try:
-            swept = beams(self._carrying, stage.kept, caps, prices, self._watch, goal)
+            swept = self._beams(stage.kept, caps, prices, goal)
             if swept.path:
                 stage.path, value = swept.path, swept.best
                 caps = replace(caps, sums=(*stage.caps.sums, (k, value * (1 - ALMOST))))
@@ -252,9 +245,10 @@ class Stages:
         prices = self._carrying.prices(kept, Watch(0.0))
         return self._carrying.sweep(kept, Caps(), prices, Watch()).best
 
-    def values(self, path: Sequence[int]) -> list[float]:
-        """Return the values of goals of a path, zero for makespans."""
-        return [self._taken(path, k) for k in range(len(self._problem.goals))]
+    def values(self, path: Sequence[int], makespan: float) -> tuple[float, ...]:
+        """Return the values of goals of a path that takes so long, s."""
+        goals = enumerate(self._problem.goals)
+        return tuple(makespan if goal.in_time else self._taken(path, k) for k, goal in goals)
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
         each, kinds = prices.each, prices.kinds

@@ -14,7 +14,7 @@ from seqopt.questions import Given, find_steps
 from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import plan_folder
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def read_steps(words: Mapping[str, Any], tell: Tell) -> tuple[Given, tuple[str, ...]]:

@@ -12,7 +12,7 @@ from seqopt._files import PAGE, csv_text, require_apart, require_folder, write_f
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 

@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 
 from seqopt._cli.terminal import columns, harmless, is_terminal
-from seqopt.work.progress import Stage, duration
+from seqopt.work import Stage, duration
 
 PATIENCE = 1.0  # s for which a command says nothing
 TICK = 0.5  # s between two lines

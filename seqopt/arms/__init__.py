@@ -23,7 +23,7 @@ from seqopt._registry import later
 from seqopt.arms.reach import find_postures
 
 if TYPE_CHECKING:
-    from seqopt.arms._postures import PostureTable
+    from seqopt.arms._tables import PostureTable
 
 __all__ = ["PostureTable", "find_postures"]
-__getattr__, __dir__ = later(__name__, {"PostureTable": "_postures"})
+__getattr__, __dir__ = later(__name__, {"PostureTable": "_tables"})

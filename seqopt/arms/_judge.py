@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from seqopt.arms._model import ArmModel
 
 
+_LITTLE = 1e-4  # by which joints are moved, rad or m
+_SAME = 1e-6  # difference of compliances, over the largest
+_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
+
+
 class PostureRules:
     """What a posture table allows to robots in a scene.
 
@@ -32,6 +37,7 @@ class PostureRules:
         self._table, self._rows = find_table(scene), permits(scene).rows
         self._armed = [(c, r) for c, r in enumerate(team) if scene.robots[r].arm is not None]
         self._known: dict[tuple[int, ...], bool] = {}
+        # by bricks, robot and place: postures that hit nothing, as bits of a number
         self._options: dict[tuple[int, int, int], int] = {}
         column = {name: i for i, name in enumerate(self._table.bricks)}
         self._placed = [column[name] for name in scene.build_order]
@@ -46,22 +52,19 @@ class PostureRules:
         ``states`` (n, c): places in build order of the nodes held, from 1; none above 0 is free.
         """
         held = states[:, [column for column, _ in self._armed]].clip(min=0).tolist()
+        standing = self._placed[:bricks]
         for places in held:
-            if (bricks, *places) not in self._known:
-                pairs = zip(self._armed, places, strict=True)
-                masks = [self._mask(bricks, robot, place) for (_, robot), place in pairs if place]
-                self._known[bricks, *places] = self._fit(masks)
+            if (bricks, *places) in self._known:
+                continue
+            pairs = zip(self._armed, places, strict=True)
+            asked = [(bricks, robot, place) for (_, robot), place in pairs if place]
+            for key in asked:
+                if key not in self._options:
+                    rows = [row for row in self._rows[key[1:]].tolist() if row >= 0]
+                    clear = (row for row in rows if not self._table.hits[row, standing].any())
+                    self._options[key] = sum(1 << row for row in clear)
+            self._known[bricks, *places] = self._fit([self._options[key] for key in asked])
         return np.array([self._known[bricks, *places] for places in held], dtype=bool)
-
-    def _mask(self, bricks: int, robot: int, place: int) -> int:
-        """Return the postures of a robot at a place that hit nothing, as bits of a number."""
-        key = (bricks, robot, place)
-        if key not in self._options:
-            standing = self._placed[:bricks]
-            rows = [row for row in self._rows[robot, place].tolist() if row >= 0]
-            clear = (row for row in rows if not self._table.hits[row, standing].any())
-            self._options[key] = sum(1 << row for row in clear)
-        return self._options[key]
 
     def _fit(self, masks: Sequence[int]) -> bool:
         """Return whether there is a posture in each set that goes with those in the others."""
@@ -80,33 +83,20 @@ class PostureRules:
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
     """Raise a `StepError` if arms have no postures that go together in a step.
 
-    Or if the compliance of their grips is not that of their joints.
+    Or if one is not at its node, or the compliance of a grip is not that of its arm's joints.
     """
     rules = PostureRules(scene, range(len(scene.robots)))
-    place = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
+    places = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     for step in steps:
-        held = np.array([[place[node] for node in step.grips]])
-        if not rules.allow(step.bricks, held)[0]:
+        grips = np.array([[places[node] for node in step.grips]])
+        if not rules.allow(step.bricks, grips)[0]:
             raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")
-    _check_grips(scene)
-
-
-_LITTLE = 1e-4  # by which joints are moved, rad or m
-_SAME = 1e-6  # difference of compliances, over the largest
-_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
-
-
-def _check_grips(scene: Scene) -> None:
-    """Raise a `StepError` if the compliance of a grip is not that of the joints of its arm.
-
-    Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
-    """
     held, table = scene.held_postures, find_table(scene)
     if held is None:
         return
     from seqopt.arms._model import ArmModel  # noqa: PLC0415  # few scenes have arms
 
-    for own, robot in enumerate(held.robots.tolist()):
+    for own, robot in enumerate(held.robots.tolist()):  # at all nodes: a proof uses all
         arm, name = scene.robots[robot].arm, scene.robots[robot].name
         assert arm is not None
         model, given = ArmModel(arm), held.compliance(scene.arms)[own]

@@ -7,21 +7,136 @@ the URDF gives for collisions, or, of links without, of those that it shows. It 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from contextlib import suppress
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
+from seqopt._files import read_bytes
 from seqopt._registry import Later
-from seqopt.arms._urdf import model_path, read_urdf
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import ExtraError, SceneError
+from seqopt.errors import ExtraError, FileError, SceneError
 from seqopt.scene.arm import Arm
+from seqopt.scene.scene import Scene
+
+_Link = ElementTree.Element
+_MACRO = re.compile(r"\$[({]")  # begins what xacro puts in
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A URDF: its ``text``; the links whose ``visual`` shapes are taken for collisions.
+
+    ``bare``: links of no shape at all that have a mass, or a joint at a distance: there is a body.
+    """
+
+    text: str
+    visual: tuple[str, ...]
+    bare: tuple[str, ...]
+
+    def __str__(self) -> str:
+        said = []
+        if self.visual:
+            said.append(f"no <collision> of {', '.join(self.visual)}: <visual> is checked instead")
+        if self.bare:
+            said.append(f"no shape at all of {', '.join(self.bare)}: nothing says what it hits")
+        return "; ".join(said)
+
+
+def model_path(arm: Arm) -> Path:
+    """Return where the URDF of an arm is; a `SceneError` says that there is none."""
+    if not arm.in_package:
+        path = Path(arm.urdf)
+        if not path.is_file():
+            raise SceneError(f"arm: there is no file {arm.urdf}; give a URDF, or package:path")
+        return path
+    package, _, rest = arm.urdf.partition(":")
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        raise SceneError(f"arm: package {package} is not installed; pip install {package}")
+    for path in (Path(root, rest) for root in spec.submodule_search_locations):
+        if path.is_file():
+            return path
+    raise SceneError(f"arm: package {package} has no file {rest}")
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Return a URDF. Raises `SceneError` if it is none, or xacro, which a URDF is made from."""
+    content = read_bytes(path)
+    try:
+        robot = ElementTree.fromstring(content)
+        xacro = any("xacro" in each.tag or _MACRO.search(str(each.attrib)) for each in robot.iter())
+    except ElementTree.ParseError as error:
+        xacro = b"<xacro:" in content
+        if not xacro:
+            raise SceneError(f"arm: {path} cannot be read ({error}); give a URDF") from error
+    if xacro:
+        made = f"{path.stem.removesuffix('.urdf')}.urdf"
+        raise SceneError(
+            f"arm: {path} is xacro, from which a URDF is made: run `xacro {path.name} > {made}` "
+            f"and give {made}"
+        )
+    visual, bare = [], []
+    bodies = {*_followed(robot)}
+    for link in robot.findall("link"):
+        name = str(link.get("name"))
+        if link.find("collision/geometry") is not None:
+            continue
+        mass = link.find("inertial/mass")
+        shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
+        for each in shown:
+            shape = ElementTree.SubElement(link, "collision")
+            shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
+        if shown:
+            visual.append(name)
+        elif name in bodies or (mass is not None and _number(str(mass.get("value"))) > 0):
+            bare.append(name)
+    return Urdf(ElementTree.tostring(robot, encoding="unicode"), tuple(visual), tuple(bare))
+
+
+def shape_notes(scene: Scene) -> tuple[str, ...]:
+    """Return which links of arms have no shapes for collisions, a line for each arm with some.
+
+    A model that cannot be read has no note: reading it for postures raises the error.
+    """
+    found = []
+    for robot in scene.robots:
+        if robot.arm is not None:
+            with suppress(SceneError, FileError):
+                found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
+    return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
+
+
+def _followed(robot: _Link) -> list[str]:
+    """Return the links except the root that have a joint at a distance from their own."""
+    joints = [each for each in robot.findall("joint") if each.find("child") is not None]
+    moved = {each.find("child").get("link") for each in joints}  # type: ignore[union-attr]
+    out = []
+    for each in joints:
+        parent, origin = each.find("parent"), each.find("origin")
+        name = "" if parent is None else str(parent.get("link"))
+        shift = "0" if origin is None else str(origin.get("xyz", "0"))
+        if name in moved and any(_number(part) for part in shift.split()):
+            out.append(name)
+    return out
+
+
+def _number(text: str) -> float:
+    """Return a number; 0 where it is none, which pinocchio refuses."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
 
 coal, pin = Later("coal"), Later("pinocchio")  # an extra
 
@@ -75,8 +190,11 @@ class ArmModel:
             raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
         self.arm, path = arm, model_path(arm)
         self.model, geometry = _read(path, arm)
-        self.data = self.model.createData()
+        self.data, self.joints = self.model.createData(), int(self.model.nq)
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
+        # from every joint, and first the root, to the next one, and last to the flange, m
+        ends = [*[*self.model.jointPlacements][1:], self.model.frames[self.flange].placement]
+        self._lengths = [float(np.linalg.norm(end.translation)) for end in ends]
         x, y = np.array(arm.x_axis), np.array(arm.y_axis)
         self.base = pin.SE3(np.column_stack([x, y, np.cross(x, y)]), np.array(arm.position))
         bodies = [*_bodies(self.model, geometry)]
@@ -107,12 +225,6 @@ class ArmModel:
                     f"arm: {path} has no shape of {', '.join(names)}, neither <collision> nor "
                     "<visual>, so nothing says what it hits; give it one"
                 )
-
-    @cached_property
-    def _lengths(self) -> list[float]:
-        """From every joint, and first the root, to the next one, and last to the flange, m."""
-        ends = [*[*self.model.jointPlacements][1:], self.model.frames[self.flange].placement]
-        return [float(np.linalg.norm(end.translation)) for end in ends]
 
     @cached_property
     def span(self) -> float:
@@ -148,11 +260,6 @@ class ArmModel:
             *(f"link {b.name} {SAYS}{tool * (b.name in beyond)}" for b in bodies),
             f"tool {SAYS}",
         )
-
-    @property
-    def joints(self) -> int:
-        """How many joints move it."""
-        return int(self.model.nq)
 
     def draw(self, draws: np.random.Generator, count: int) -> Floats:
         """Return postures (count, joints) within its limits, drawn at random."""
@@ -288,9 +395,10 @@ class PosedArm:
         Of the foot the last point is there twice: there is no tool.
         """
         model = arm_model(self.arm)
-        axes, flange = model.flange_pose(self._own)
+        own = np.asarray(self.joints)[: model.joints]
+        axes, flange = model.flange_pose(own)
         data, root = model.data, model.base.translation
-        pin.forwardKinematics(model.model, data, self._own)
+        pin.forwardKinematics(model.model, data, own)
         joints = [model.base.act(data.oMi[j].translation) for j in range(1, model.model.njoints)]
         points = [root, *joints, flange, flange + self.arm.tool_length * axes[:, 2]]
         far = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME
@@ -311,17 +419,14 @@ class PosedArm:
         ]
         if not self.holds:
             return tuple(out)
-        placed = model.placed(self._own[None], np.array([self.arm.tool_length]))
+        own = np.asarray(self.joints)[None, : model.joints]
+        placed = model.placed(own, np.array([self.arm.tool_length]))
         angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
         ring = self.arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
         end = np.array([0.0, 0.0, 0.5 * self.arm.tool_length])
         local = [*(body.points for body in model.moving), np.concatenate([ring - end, ring + end])]
         moved = zip(local, placed.rotation[0], placed.shift[0], strict=True)
         return (*out, *(points @ turn.T + shift for points, turn, shift in moved))
-
-    @property
-    def _own(self) -> Floats:
-        return np.asarray(self.joints)[: arm_model(self.arm).joints]
 
 
 def idle_arm(arm: Arm) -> PosedArm:

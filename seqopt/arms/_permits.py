@@ -24,10 +24,10 @@ from seqopt.errors import SceneError
 from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
 from seqopt.sequence.part import find_scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
-    from seqopt.arms._postures import PostureTable
+    from seqopt.arms._tables import PostureTable
 
 _SCENES = 32  # of which it is kept, the last ones that were asked for
 _WAYS = 8_000_000  # of holding that are looked at together
@@ -126,7 +126,7 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
 
     ``at`` (P,): places of postures; ``ends`` (P,): from which brick count on they hit something.
     """
-    from seqopt.arms._postures import choose  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._tables import choose  # noqa: PLC0415  # few scenes have arms
 
     first = (at + 1) // 2  # the count at which the brick of a place is placed
     last = nodes // 2 + 1

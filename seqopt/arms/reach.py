@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seqopt.scene.scene import Scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
-    from seqopt.arms._postures import PostureTable
+    from seqopt.arms._tables import PostureTable
 
 
 def find_postures(

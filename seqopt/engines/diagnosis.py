@@ -180,7 +180,7 @@ def _off_grips(moved: Floats, borne: Floats, compliance: GripCompliance) -> Floa
         flexibility = compliance.transmitted[0]
         ways = flexibility.shape[2]
         out[:, :ways] += np.einsum("rij,rj->ri", flexibility, bears[:, :ways])
-    out[~compliance.transmits(1, len(moved))[0], 3:] = 0.0
+    out[~compliance.transmits(len(moved)), 3:] = 0.0
     return np.asarray(out)
 
 

@@ -114,7 +114,7 @@ class _Holds(NamedTuple):
 def _hold(network: Network, columns: Ints, compliance: GripCompliance, size: int) -> _Holds:
     """Return how the grips of one set hold a frame with as many motions."""
     grips, at = len(columns), 6 * network.inner.ravel()[columns][:, None] + np.arange(6)
-    rigid, turns = ~compliance.compliant(1, grips)[0], compliance.transmits(1, grips)[0]
+    rigid, turns = ~compliance.compliant(1, grips)[0], compliance.transmits(grips)
     spring: list[Floats] = [np.zeros((0, size))]
     stiffness: list[float] = []
     stretched: list[float] = []
@@ -126,7 +126,7 @@ def _hold(network: Network, columns: Ints, compliance: GripCompliance, size: int
         stiffness += (1 / values).tolist()
         stretched += (axes.T @ offset).tolist()
     rows = sparse.csr_array(np.vstack(spring))
-    moved = compliance.offsets(1, grips)[0][rigid].ravel()
+    moved = compliance.offsets(grips)[rigid].ravel()
     fixed = at[rigid, :3].ravel()
     return _Holds(fixed, moved, rows, np.array(stiffness), np.array(stretched), turns)
 

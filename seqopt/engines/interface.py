@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache
 from itertools import combinations
 from typing import NamedTuple, Protocol
 
@@ -22,7 +21,6 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network, network_of
-from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
 
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
@@ -73,12 +71,7 @@ class Fields(FrozenValue):
     support: Floats
     joint_wrench: Floats
     brick_twist: Floats
-    grip_moment: Floats = None  # type: ignore[assignment]  # zero where none is given
-
-    def __post_init__(self) -> None:
-        if self.grip_moment is None:
-            settle(self, grip_moment=np.zeros_like(self.grip_force))
-        super().__post_init__()
+    grip_moment: Floats
 
 
 def linear_limit(scene: Scene) -> float:
@@ -158,15 +151,9 @@ SHAPES = dict.fromkeys(FLAGS, (6,)) | {"edge_force": (), "displacement": (3,)}
 """Trailing shape of every field, for an edge, node, end, spring or brick."""
 
 
-@cache
-def names_wanted(want: Want) -> frozenset[str]:
-    """Return the names of the requested fields except grip forces."""
-    return frozenset(name for name, flag in FLAGS.items() if want & flag)
-
-
 def keep_wanted(answer: Fields, want: Want) -> Fields:
     """Return the requested fields alone."""
-    dropped = FLAGS.keys() - names_wanted(want)
+    dropped = [name for name, flag in FLAGS.items() if not want & flag]
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
@@ -247,9 +234,9 @@ class GripCompliance(FrozenValue):
         matrix = None if self.matrix is None else self.matrix[which]
         return replace(self, moved=moved, matrix=matrix)
 
-    def offsets(self, sets: int, grips: int) -> Floats:
-        """Return how far the grips are moved (S, r, 3)."""
-        return np.zeros((sets, grips, 3)) if self.moved is None else self.moved
+    def offsets(self, grips: int) -> Floats:
+        """Return how far the grips of one set are moved (r, 3)."""
+        return np.zeros((grips, 3)) if self.moved is None else self.moved[0]
 
     def compliant(self, sets: int, grips: int) -> Bools:
         """Return which grips (S, r) are compliant to forces."""
@@ -257,11 +244,11 @@ class GripCompliance(FrozenValue):
             return np.zeros((sets, grips), dtype=bool)
         return np.asarray(self.matrix[..., :3, :3].any(axis=(2, 3)))
 
-    def transmits(self, sets: int, grips: int) -> Bools:
-        """Return which grips (S, r) transmit moments."""
+    def transmits(self, grips: int) -> Bools:
+        """Return which grips of one set transmit moments, (r,)."""
         if self.matrix is None or self.matrix.shape[3] == 3:
-            return np.zeros((sets, grips), dtype=bool)
-        return np.isfinite(self.matrix[..., 5, 5])
+            return np.zeros(grips, dtype=bool)
+        return np.isfinite(self.matrix[0, :, 5, 5])
 
     @property
     def transmitted(self) -> Floats:
@@ -295,7 +282,18 @@ def read_compliance(
         )
     if not np.isfinite(offsets).all():
         raise GripError("moved: a length is not finite; give meters")
-    _follow_bricks(network, columns, offsets, found)
+    # two rigid grips on one brick cannot stretch it: along it, both nodes go halfway between
+    ends = network.node_position[network.inner]
+    steps = ends[:, 1] - ends[:, 0]
+    axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    yields = found.compliant(*columns.shape)
+    for i, j in combinations(range(columns.shape[1]), 2):
+        one = columns[:, i] // 2 == columns[:, j] // 2
+        both = np.flatnonzero(one & ~yields[:, i] & ~yields[:, j])
+        axis = axes[columns[both, i] // 2]
+        stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
+        offsets[both, i] += 0.5 * stretch[:, None] * axis
+        offsets[both, j] -= 0.5 * stretch[:, None] * axis
     return replace(found, moved=offsets)
 
 
@@ -345,8 +343,8 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[_GripSpring]:
     """Return the compliant ones of the grips of one set, in space."""
     if compliance.matrix is None:
         return []
-    yields, turns = compliance.compliant(1, grips)[0], compliance.transmits(1, grips)[0]
-    matrix, offset = compliance.matrix[0], compliance.offsets(1, grips)[0]
+    yields, turns = compliance.compliant(1, grips)[0], compliance.transmits(grips)
+    matrix, offset = compliance.matrix[0], compliance.offsets(grips)
     out = []
     for grip in range(grips):
         ways = [way for way in range(6) if (yields[grip] if way < 3 else turns[grip])]
@@ -360,26 +358,6 @@ def grip_springs(compliance: GripCompliance, grips: int) -> list[_GripSpring]:
         offsets = np.pad(offset[grip], (0, 3))[ways]
         out.append(_GripSpring(grip, ways, own / np.outer(scale, scale), offsets))
     return out
-
-
-def _follow_bricks(
-    network: Network, columns: Ints, offsets: Floats, compliance: GripCompliance
-) -> None:
-    """Restrict the offsets of two rigid grips on one brick to rigid motions, in place.
-
-    It cannot become longer: along it, both nodes go halfway between.
-    """
-    ends = network.node_position[network.inner]
-    steps = ends[:, 1] - ends[:, 0]
-    axes = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-    yields = compliance.compliant(*columns.shape)
-    for i, j in combinations(range(columns.shape[1]), 2):
-        one = columns[:, i] // 2 == columns[:, j] // 2
-        both = np.flatnonzero(one & ~yields[:, i] & ~yields[:, j])
-        axis = axes[columns[both, i] // 2]
-        stretch = np.einsum("si,si->s", offsets[both, j] - offsets[both, i], axis)
-        offsets[both, i] += 0.5 * stretch[:, None] * axis
-        offsets[both, j] -= 0.5 * stretch[:, None] * axis
 
 
 @contextmanager
@@ -397,17 +375,15 @@ def _failing_in_a_line() -> Iterator[None]:
         ) from error
 
 
-def no_sets(network: Network, bricks: int, held: int) -> Fields:
-    """Return the fields of no grip set at all that would hold some nodes: their shapes."""
+def no_sets(network: Network, bricks: int, held: int, *, sets: int = 0) -> Fields:
+    """Return the fields of no grip set at all that would hold some nodes: their shapes.
+
+    ``sets``: of so many, all zero, as of the empty site, which one set of no grips holds.
+    """
     counts = _counts_of_fields(network, bricks)
-    empty = {name: np.empty((0, count, *SHAPES[name])) for name, count in counts.items()}
-    return Fields(grip_force=np.empty((0, held, 3)), **empty)
-
-
-def _empty_site(network: Network) -> Fields:
-    """Return the fields of a site on which nothing stands, of one set of no grips."""
-    empty = no_sets(network, 0, 0)
-    return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})
+    empty = {name: np.zeros((sets, count, *SHAPES[name])) for name, count in counts.items()}
+    none = np.zeros((sets, held, 3))
+    return Fields(grip_force=none, grip_moment=none.copy(), **empty)
 
 
 def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:

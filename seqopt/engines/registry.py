@@ -160,7 +160,7 @@ def _frame(network: Network | Scene) -> Engine:
 
 
 def _discrete(network: Network | Scene, **options: Any) -> Engine:
-    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415  # as does the frame
+    from seqopt.engines.discrete import DiscreteEngine  # noqa: PLC0415  # as does the frame
 
     return DiscreteEngine(network, **options)
 

@@ -13,7 +13,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.library.common import JointLaw
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 Entry = dict[str, Any]
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m

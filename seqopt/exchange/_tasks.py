@@ -18,7 +18,7 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt._registry import Later
-from seqopt.arms._plan_postures import PlanPostures, plan_postures
+from seqopt.arms._kept import PlanPostures, plan_postures
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._compas_shapes import compas_frame, mesh_data
 from seqopt.exchange._grip_frames import Frame, Held, hold

@@ -22,7 +22,7 @@ from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_field
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, normal_of, plane_axes, polygon_moments
-from seqopt.work.progress import Progress, Tell
+from seqopt.work import Progress, Tell
 
 SHAPELY = Later("shapely")  # an extra
 _Shape = Polyhedron | Surface

@@ -11,7 +11,7 @@ from seqopt.exchange._formats import formats, writable
 from seqopt.questions import Built, Steps, find_steps
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def export(  # every question is a word of its own

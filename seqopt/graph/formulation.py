@@ -17,7 +17,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
 from seqopt.scene.scene import Order
-from seqopt.work.progress import Clock
+from seqopt.work import Clock
 
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"

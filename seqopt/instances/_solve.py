@@ -22,7 +22,7 @@ from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._answers import Found, _proven, called, check_run, with_numbers
 from seqopt.plan._infeasible import claimed
-from seqopt.work.progress import INTERRUPT, answered
+from seqopt.work import INTERRUPT, _answered
 
 PROVEN = 1 - 1e-6  # of a path that costs nothing and is said to cost this much: there is none
 
@@ -91,7 +91,7 @@ def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: 
     told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
     solve = partial(formulation.solve, deepcopy(instance), **run.options, **told)
     try:
-        with answered(watch.interrupt) if formulation.watched else nullcontext():
+        with _answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, Solution, solve)
     except InfeasibleError as error:
         if not instance.caps:

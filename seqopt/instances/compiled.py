@@ -31,7 +31,7 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
 from seqopt.times._graph import TimedGraph
-from seqopt.work.progress import Clock, Tell
+from seqopt.work import Clock, Tell
 from seqopt.workflow import Robust, Search, pose_build
 
 SEARCH = Search()  # it is frozen

@@ -36,7 +36,7 @@ from seqopt.judge._schedules import judge_schedule, ordered
 from seqopt.judge.certificate import Certificate
 from seqopt.scene._checks import LARGEST_NUMBER, short
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import keep
+from seqopt.work import _keep
 
 INFEASIBLE = Later("seqopt.plan._infeasible")  # seldom needed
 COUNTED = ("each", "stability")  # of a problem: they know what was computed
@@ -155,7 +155,7 @@ def find(problem: States, formulation: Formulation, run: Run) -> Found:
     watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
     limit = {"watch": watch} if formulation.watched else {"seconds": run.left}
     limit = limit if formulation.watched or isfinite(run.left) else {}
-    with keep(problem.resources.executor, problem.resources.workers):
+    with _keep(problem.resources.executor, problem.resources.workers):
         with run.clock.needed("finding a first plan"):
             options = {**run.options, **told, **limit}
             selection = _choose_states(formulation, problem, options, run)
@@ -254,7 +254,7 @@ def walk(problem: States, watch: Watch) -> Solution:
     space, resources = problem.space, problem.resources
     path, state = list[tuple[int, ...]](), space.start()
     try:
-        with keep(resources.executor, resources.workers):
+        with _keep(resources.executor, resources.workers):
             while len(path) < space.levels:
                 if watch.over:
                     raise TimeUpError(f"{watch.seconds:.3g} s: {_so_far(problem, path)}; give more")

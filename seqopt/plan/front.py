@@ -30,8 +30,7 @@ from seqopt.responses._grip_sets import Moved
 from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.work._workers import free_memory
-from seqopt.work.progress import INTERRUPT, Clock, Tell, with_progress
+from seqopt.work import INTERRUPT, Clock, Tell, _free_memory, with_progress
 
 DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
@@ -89,7 +88,7 @@ class FrontProblem:
         """All feasible states, and their space; raises `InfeasibleError` if no build ends."""
 
         def tell(found: Explorer) -> None:
-            if found.nbytes > free_memory():
+            if found.nbytes > _free_memory():
                 less = "give an order, or rules with fewer states"
                 raise ProblemError(f"pareto: the states do not fit the memory; {less}")
 

@@ -45,7 +45,7 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Order
 from seqopt.sequence.steps import Site, Step, StepKind, idle_robots
 from seqopt.stability.standing import Standing
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 PROOFS = Later("seqopt.judge._schedules")  # 20 ms
 SPENT = Later("seqopt.plan._spent")  # where it is asked for

@@ -31,7 +31,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
-from seqopt.work.progress import INTERRUPT
+from seqopt.work import INTERRUPT
 
 if TYPE_CHECKING:
     from seqopt.scene.scenarios import Scenarios

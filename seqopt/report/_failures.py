@@ -15,7 +15,7 @@ from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability.failure_map import FailureMap
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import Search, optimize
 
 PATIENCE = 20.0  # s for each plan: one that is not proven to be the best is a way to build as well

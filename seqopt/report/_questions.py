@@ -22,7 +22,7 @@ from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.part import find_scene
 from seqopt.stability.failure_map import BuildProver, find_prover
 from seqopt.study import find_criterion
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import DEFAULTS
 
 

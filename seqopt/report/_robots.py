@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
+from seqopt.arms._kept import plan_postures
 from seqopt.arms._model import PosedArm, idle_arm
-from seqopt.arms._plan_postures import plan_postures
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._grip_frames import hold

@@ -50,7 +50,7 @@ from seqopt.study import (
     printed_maxima,
     published_plan,
 )
-from seqopt.work.progress import Stage, Tell
+from seqopt.work import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
 MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]

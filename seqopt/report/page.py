@@ -22,7 +22,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from seqopt._files import csv_text
-from seqopt.arms._urdf import shape_notes
+from seqopt.arms._model import shape_notes
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network

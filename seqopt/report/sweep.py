@@ -25,8 +25,7 @@ from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.stability.assessment import Verdict
-from seqopt.work._workers import hire, map_ordered
-from seqopt.work.progress import Stage, Tell
+from seqopt.work import Stage, Tell, hire, map_ordered
 from seqopt.workflow import optimize
 
 RANGE = re.compile(r"(?P<low>[^,=]+?)\.\.(?P<high>[^,=/]+)/(?P<count>\d+)(?P<log>log)?")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pickle
 import threading
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, KnownRows
 from seqopt.engines.interface import Engine, NamedEngine, Want, linear_limit
 from seqopt.engines.registry import Recipe, recipe_of
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, Extremes
 from seqopt.errors import MechanismError, ProblemError, SceneError
 from seqopt.responses._tolerance import misfits
 from seqopt.responses.quantities import (
@@ -37,8 +37,7 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.sequence.steps import Step
-from seqopt.work._workers import hire, map_ordered, one_thread
-from seqopt.work.progress import Progress, Tell
+from seqopt.work import Progress, Tell, _one_thread, hire, map_ordered
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
@@ -107,10 +106,17 @@ class Block(FrozenValue):
     props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
     compiled: bool = False  # whether there is so much to do that loading compiled loops pays
 
-    @property
-    def work(self) -> float:
-        """Estimated work, without unit: it grows with the bricks."""
-        return work(len(self.grips), self.bricks)
+    def asked(self) -> tuple[Ints, Want]:
+        """Return all grips, those of props last, and the fields from which responses follow."""
+        props = np.tile(np.array(self.props, dtype=np.int64), (len(self.grips), 1))
+        needs = (CHOSEN_BY[name].needs for name in self.names if name in CHOSEN_BY)
+        want = reduce(or_, needs, Want.SCREEN if self.screen else Want(0))
+        return np.hstack([self.grips, props]), want
+
+    def rows(self, found: Extremes) -> Floats:
+        """Return responses and sizes of grip forces (S, R + r) that are extremes."""
+        forces = require_finite("grip force", found.force, self.bricks)[:, : self.grips.shape[1]]
+        return np.column_stack([*(EXTREMES[name](found) for name in self.names), forces])
 
 
 def work(states: int, bricks: int) -> float:
@@ -118,47 +124,28 @@ def work(states: int, bricks: int) -> float:
     return float(states * (bricks + 20))  # 20: what every state costs, however small it is
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Answers(FrozenValue):
-    """The requested responses of a block (S,), SI units, and sizes of grip forces (S, r), N.
+def answer(engine: Engine, block: Block) -> Floats:
+    """Return the responses of a block of states, SI units, and sizes of grip forces (S, R + r), N.
 
-    ``corrected``: how many of its sets an engine of another process had to correct.
+    Raises what the engine does.
     """
-
-    values: Mapping[str, Floats]
-    forces: Floats
-    corrected: int = 0
-
-
-def answer(engine: Engine, block: Block) -> Answers:
-    """Return the responses of a block of states. Raises what the engine does."""
-    want = _want(block)
-    sets, robots = block.grips.shape
-    grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
+    (grips, want), robots = block.asked(), block.grips.shape[1]
     if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
-        with one_thread():
-            found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
-        forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
-        return Answers({name: EXTREMES[name](found) for name in block.names}, forces)
-    with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
+        with _one_thread():
+            return block.rows(engine._extremes(block.bricks, grips, want, compiled=block.compiled))
+    with _one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
     network, bricks = engine.network, block.bricks
     asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     if TOLERANCE in block.names:
-        with one_thread():
+        with _one_thread():
             values[TOLERANCE] = misfits(engine, bricks, grips)
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
-    return Answers(values, forces)
-
-
-def _want(block: Block) -> Want:
-    """Return the fields from which the responses of a block follow."""
-    needs = (CHOSEN_BY[name].needs for name in block.names if name in CHOSEN_BY)
-    return reduce(or_, needs, Want.SCREEN if block.screen else Want(0))
+    return np.column_stack([*(values[name] for name in block.names), forces])
 
 
 def packed(engine: Engine) -> bytes:
@@ -192,8 +179,7 @@ class GripSets:
 
     ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
     that are wanted; ``resources``: who solves them; ``screen``: whether six digits are enough, to
-    choose by; ``loose``: whether responses of mechanisms are infinite instead of raising a
-    `MechanismError`; ``work``: that is known to come, as `seqopt.responses._grip_sets.work` has it.
+    choose by. Responses of mechanisms are infinite.
 
     >>> import numpy as np
     >>> import seqopt
@@ -211,11 +197,9 @@ class GripSets:
         resources: Resources = HERE,
         *,
         screen: bool = False,
-        loose: bool = True,
-        work: float = 0.0,
     ) -> None:
         self._engine, self._resources, self._screen = engine, resources, screen
-        self.names, self._known, self._work, self._loose = tuple(names), KnownRows(), work, loose
+        self.names, self._known, self._work = tuple(names), KnownRows(), 0.0
         scene = engine.network.scene
         nodes = np.array([node for brick in scene.placed for node in brick.nodes])
         kinds = [k * scene.grip_kinds.span for k in range(len(scene.grip_kinds.turns))]
@@ -267,7 +251,7 @@ class GripSets:
 
         def solve(new: Ints) -> Floats:
             sets = self._block(bricks, every[new])
-            return solve_sets(self._engine, sets, self._resources, loose=self._loose)
+            return solve_sets(self._engine, sets, self._resources)
 
         return self._known.of((bricks, every.shape[1]), self._codes(every), solve)
 
@@ -284,53 +268,45 @@ class GripSets:
         return Block(bricks, grips, self.names, self._screen, props, self._work >= COMPILED)
 
 
-def solve_sets(
-    engine: Engine, sets: Block, resources: Resources = HERE, *, loose: bool = True
-) -> Floats:
+def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floats:
     """Return responses and grip forces (S, R + r) of grip sets of one brick count, SI units.
 
-    ``loose``: as of `GripSets`. Raises `SolverError`, `WorkerError`.
+    Infinite of mechanisms. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
     own = resources if len(parts) > 1 else HERE  # to share one part does not pay
-    progress = Progress("responses", sets.work, own.progress)
+    progress = Progress("responses", work(len(grips), sets.bricks), own.progress)
 
-    def done(part: Block, found: Answers) -> None:
-        progress.add(part.work)
+    def done(part: Block, found: tuple[Floats, int]) -> None:
+        progress.add(work(len(part.grips), part.bricks))
         if crew is not None and isinstance(engine, NamedEngine):  # else it has counted itself
             engine.answered += len(part.grips)
-            engine.corrected += found.corrected
+            engine.corrected += found[1]
 
     rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
     with hire(own.executor, own.workers) as crew:
-        task = partial(_answer, engine if crew is None else packed(engine), loose=loose)
+        task = partial(_answer, engine if crew is None else packed(engine))
         with closing(map_ordered(task, parts, crew, done)) as answers:
-            for found in answers:
-                columns = [found.values[name] for name in sets.names]
-                rows.append(np.column_stack([*columns, found.forces]))
+            rows += [found for found, _ in answers]
     return np.concatenate(rows)
 
 
-def _answer(engine: Engine | bytes, block: Block, *, loose: bool) -> Answers:
-    """Return answers; ``loose``: infinite for mechanisms, which are isolated by bisection."""
+def _answer(engine: Engine | bytes, block: Block) -> tuple[Floats, int]:
+    """Return what `answer` does, and how many sets the engine had to correct.
+
+    Mechanisms are isolated by bisection: their rows are infinite.
+    """
     engine, count = unpacked(engine), len(block.grips)
     before = getattr(engine, "corrected", 0)
-    try:
-        found = answer(engine, block)
-        return replace(found, corrected=getattr(engine, "corrected", 0) - before)
-    except MechanismError:
-        if not loose:
-            raise
+    with suppress(MechanismError):
+        return answer(engine, block), getattr(engine, "corrected", 0) - before
     if count == 1:
-        infinite = dict.fromkeys(block.names, np.full(1, np.inf))
-        return Answers(infinite, np.full(block.grips.shape, np.inf))
+        return np.full((1, len(block.names) + block.grips.shape[1]), np.inf), 0
     halves = block.grips[: count // 2], block.grips[count // 2 :]
-    parts = [_answer(engine, replace(block, grips=half), loose=True) for half in halves]
-    values = {name: np.concatenate([part.values[name] for part in parts]) for name in block.names}
-    forces = np.concatenate([part.forces for part in parts])
-    return Answers(values, forces, sum(part.corrected for part in parts))
+    parts = [_answer(engine, replace(block, grips=half)) for half in halves]
+    return np.concatenate([rows for rows, _ in parts]), sum(corrected for _, corrected in parts)
 
 
 class ScenarioSets:
@@ -352,19 +328,14 @@ class ScenarioSets:
 
         ``parts``: numbers of scenarios.
         """
-        stacked, names = self._stacked, block.names
-        sets, robots = block.grips.shape
-        grips = np.hstack([block.grips, np.tile(np.array(block.props, dtype=np.int64), (sets, 1))])
-        able = stacked is not None and sets and grips.shape[1] and EXTREMES.keys() >= {*names}
+        stacked, (grips, want) = self._stacked, block.asked()
+        able = stacked is not None and grips.size and EXTREMES.keys() >= {*block.names}
         if not able or not stacked.fits(block.bricks):
             return {}
         out = dict[int, Floats]()
-        with suppress(MechanismError), one_thread():  # which sets are loose is found one by one
-            for k, found in zip(
-                parts, stacked.extremes(parts, block.bricks, grips, _want(block)), strict=True
-            ):
-                forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
-                out[k] = np.column_stack([*(EXTREMES[name](found) for name in names), forces])
+        with suppress(MechanismError), _one_thread():  # which sets are loose is found one by one
+            each = stacked.extremes(parts, block.bricks, grips, want)
+            out |= {k: block.rows(found) for k, found in zip(parts, each, strict=True)}
         return out
 
     def fill(self, parts: Sequence[int], sets: Sequence[GripSets], bricks: int, held: Ints) -> None:

@@ -24,8 +24,8 @@ from seqopt.engines.interface import (
     Fields,
     OpeningEngine,
     Want,
-    _empty_site,
     linear_limit,
+    no_sets,
     select_sets,
 )
 from seqopt.engines.registry import AutoEngine, _chooser_of, recipe_of, simplest
@@ -179,7 +179,7 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     if not step.bricks:  # where a take-down ends
-        return _empty_site(engine.network)
+        return no_sets(engine.network, 0, 0, sets=1)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 
@@ -535,30 +535,12 @@ def _left_out(within: LinearRange, builds: Mapping[str, _Columns]) -> Iterator[s
     yield "motion in time"
 
 
-def _each_tolerance(
-    engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
-) -> Floats:
-    """Return the tolerance of grips of every step, m; those alike are solved as one batch.
-
-    ``known``: cache by bricks and grips, updated in place.
-    """
-    known = {} if known is None else known
-    new = {(bricks, len(held), held) for _, bricks, held in steps if (bricks, held) not in known}
-    for (bricks, count), same in groupby(sorted(new), key=itemgetter(0, 1)):
-        sets = [held for *_, held in same]
-        grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
-        for held, misfit in zip(sets, misfits(engine, bricks, grips).tolist(), strict=True):
-            off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
-            known[bricks, held] = off
-    return np.array([known[bricks, held] for _, bricks, held in steps], dtype=float)
-
-
 def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     """Describe the tolerance of grips, in parentheses.
 
     Empty if the engine is not linear, there are many bricks, or a payload is exceeded anyway.
     """
-    scene = within.engine.network.scene
+    scene, known = within.engine.network.scene, within.offs
     linear = isinstance(within.engine, AutoEngine | ComplianceEngine)
     if not linear or len(scene.bricks) > _FEW:
         return ""
@@ -567,11 +549,17 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     )
     if any((np.abs(np.asarray(force)) > robot.payload).any() for robot, force in carried):
         return ""
-    held = {name: _held_in_table(scene, table) for name, table in builds.items()}
-    found = _each_tolerance(within.engine, [*chain.from_iterable(held.values())], within.offs)
-    at = int(found.argmin())
-    if not 0 < found[at] < np.inf:  # two rigid grips on one brick have no tolerance
+    places = [(name, *one) for name, each in builds.items() for one in _held_in_table(scene, each)]
+    new = {(bricks, len(held), held) for *_, bricks, held in places if (bricks, held) not in known}
+    for (bricks, count), same in groupby(sorted(new), key=itemgetter(0, 1)):
+        sets = [held for *_, held in same]
+        grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
+        for held, misfit in zip(sets, misfits(within.engine, bricks, grips).tolist(), strict=True):
+            off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+            known[bricks, held] = off
+    name, step, bricks, held = min(places, key=lambda place: known[place[2], place[3]])
+    off = known[bricks, held]
+    if not 0 < off < np.inf:  # two rigid grips on one brick have no tolerance
         return ""
-    places = [(name, step) for name, steps in held.items() for step, *_ in steps]
-    where = f"step {places[at][1]}{f' of {places[at][0]}' if len(builds) > 1 else ''}"
-    return f" (rigid grips {length_text(found[at])} off exceed a payload: {where})"
+    where = f"step {step}{f' of {name}' if len(builds) > 1 else ''}"
+    return f" (rigid grips {length_text(off)} off exceed a payload: {where})"

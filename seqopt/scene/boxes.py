@@ -21,7 +21,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import as_vector, as_vectors, short, units, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron, _surround, fans, normal_of, plane_axes
-from seqopt.work.progress import Progress, Tell
+from seqopt.work import Progress, Tell
 
 optimize, spatial = Later("scipy.optimize"), Later("scipy.spatial")  # slow to import
 

@@ -29,7 +29,7 @@ from seqopt.scene._checks import (
 )
 from seqopt.scene.arm import Arm, HeldPostures, from_arms
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

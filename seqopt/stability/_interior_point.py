@@ -199,18 +199,18 @@ class _Search:
             maps = [sparse.csr_array(whole)[rows][:, np.repeat(own, 3)] for whole, own in pairs]
         tension, cohesion, payload = limits(assembly, case, 0.0)
         borne = tension[self._corners], cohesion[self._corners], payload[self._grips]
-        self._cones = Cones(case.friction, *borne)
-        self._load = case.loads(assembly)[0][np.repeat(blocks, 6)]
+        self.cones = Cones(case.friction, *borne)
+        self.load = case.loads(assembly)[0][np.repeat(blocks, 6)]
         self._balance = Balance(sparse.hstack(maps, format="csr"))
 
     @np.errstate(all="ignore")
     def start(self) -> tuple[_Point, Floats]:
         """Return the point of least forces in equilibrium, and a motion that nothing hinders."""
-        balance, cones = self._balance, self._cones
+        balance, cones = self._balance, self.cones
         weight = np.repeat(np.eye(3)[:, :, None], cones.owners, axis=2)
-        motion = balance.solver(weight)(self._load)
+        motion = balance.solver(weight)(self.load)
         force = -balance.parting(motion)
-        loose = np.abs(self._load + balance.wrench(force)).max() > _DONE
+        loose = np.abs(self.load + balance.wrench(force)).max() > _DONE
         slack = cones.of(force)
         slack[0] += cones.most
         needed = -(slack[0] - np.linalg.norm(slack[1:], axis=0)).min()
@@ -252,13 +252,13 @@ class _Search:
 
     def _directions(self, point: _Point, inverse: Floats) -> Callable[[Floats], _Point]:
         """Return the direction in which to go from a point, by the aim of the scaled cones."""
-        balance, cones, square = self._balance, self._cones, times(inverse, inverse)
+        balance, cones, square = self._balance, self.cones, times(inverse, inverse)
         weighed = times(square, cones.map)
         borne = cones.owned(times(cones.map.swapaxes(0, 1), weighed))
         soft = np.asarray(np.linalg.inv(borne.T).T, dtype=float)
         solve = balance.solver(soft)
         lift = cones.owned(weighed[0])
-        left = balance.wrench(point.force) + self._load
+        left = balance.wrench(point.force) + self.load
         uneven = balance.parting(point.motion) - cones.pulled(point.press)
         too_much = point.press[0].sum() - 1.0
         lifting = solve(balance.wrench(apply(soft, lift)))
@@ -287,11 +287,6 @@ class _Search:
         motion[self._blocks] = point.motion.reshape(-1, 6)
         return Answer(Claim.SOLVED, max(point.raised, 0.0), contact, grip, motion)
 
-    def promises(self, point: _Point) -> bool:
-        """Return whether a point's forces or its motion may prove something."""
-        work = self._load @ point.motion - self._cones.most @ point.press[0]
-        return bool(point.raised <= _DONE or work > 0)
-
 
 def approach(assembly: Assembly, case: Case, blocks: Bools | None = None) -> Iterator[Answer]:
     """Yield forces and motions, each nearer to a proof that a case needs no z, or some.
@@ -311,7 +306,8 @@ def approach(assembly: Assembly, case: Case, blocks: Bools | None = None) -> Ite
             if better is None:
                 return
             point = better
-            if search.promises(point):
+            work = search.load @ point.motion - search.cones.most @ point.press[0]
+            if point.raised <= _DONE or work > 0:  # its forces or its motion may prove something
                 yield search.claim(point)
     except (RuntimeError, np.linalg.LinAlgError):  # a system that has no solution
         return

@@ -290,8 +290,8 @@ class TiltedStates:
 
     def survive(
         self, pull: float, places: Ints, payload: Floats, *, solve: bool
-    ) -> tuple[Bools, Bools]:
-        """Return which grip sets survive a pull in all directions, and which fall by it.
+    ) -> NDArray[np.int8]:
+        """Return verdicts of grip sets under a pull in all directions; a fall in one is a fall.
 
         Of sets that stand without a pull. ``pull``: over gravity; ``places``, ``payload`` (S, r):
         as of `HeldStates.bracket`; ``solve``: whether directions that are open are solved.
@@ -324,7 +324,8 @@ class TiltedStates:
                 asked[own, way] = True
                 survived[own, way] = np.where(low >= 0, low, np.nan)
                 least[own] = np.minimum(least[own], high)
-        return hulls(_ANGLES, survived)[0] >= pull, least < pull
+        stand = np.where(hulls(_ANGLES, survived)[0] >= pull, STANDS, OPEN)
+        return np.where(least < pull, FALLS, stand).astype(np.int8)
 
     def _next(self, angle: Floats, asked: Bools) -> Ints:
         """Return the directions to ask next, (S,): -1 where there is none that would help.
@@ -411,40 +412,31 @@ class Screen:
         """
         out = np.zeros(len(np.asarray(held)), dtype=np.int8)
         for own, part, places, loads in held_parts(self.network, bricks, held, payload):
-            states = self._upright(part)
-            asked = places, loads
+            known, key, asked = self._proofs, (part, self.mortar), (places, loads)
+            if key not in known.upright:
+                assembly = node_assembly(self.network, part[0], held=part[1])
+                case = bonded(assembly, self.mortar)  # of the least bond that is lacking
+                answers = known.answers.setdefault(part, []) if known.keeps else None
+                states = HeldStates(assembly, case, self._compile, case.fixed(), answers)
+                known.upright[key] = states
+            states = known.upright[key]
             bracket = states.bracket(*asked, _decided) if solve else states.known.bracket(*asked)
-            found = _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
+            stand, fall = bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT
+            found = np.where(fall, FALLS, np.where(stand, STANDS, OPEN)).astype(np.int8)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):
-                tilted, key = self._proofs.tilted, (part, self.mortar)
-                if key not in tilted:
-                    up = self.network.scene.up
-                    tilted[key] = TiltedStates(states.assembly, self.mortar, up, self._compile)
+                if key not in known.tilted:
+                    pulled = states.assembly, self.mortar, self.network.scene.up, self._compile
+                    known.tilted[key] = TiltedStates(*pulled)
                 asked = places[rows], loads[rows]
-                both = tilted[key].survive(np.tan(self.tilt), *asked, solve=solve)
-                found[rows] = _of_both(*both)
+                found[rows] = known.tilted[key].survive(np.tan(self.tilt), *asked, solve=solve)
             out[own] = found
         return out
-
-    def _upright(self, part: Part) -> HeldStates:
-        known, key = self._proofs.upright, (part, self.mortar)
-        if key not in known:
-            assembly = node_assembly(self.network, part[0], held=part[1])
-            case = bonded(assembly, self.mortar)  # of the least bond that is lacking
-            answers = self._proofs.answers.setdefault(part, []) if self._proofs.keeps else None
-            known[key] = HeldStates(assembly, case, self._compile, case.fixed(), answers)
-        return known[key]
 
 
 def _decided(bracket: Floats) -> Bools:
     """Return where brackets (S, 2) prove that no bond is lacking, or that some is."""
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
-
-
-def _of_both(stands: Bools, falls: Bools) -> NDArray[np.int8]:
-    """Return verdicts, open where neither is proven; a fall counts before a stand."""
-    return np.where(falls, FALLS, np.where(stands, STANDS, OPEN)).astype(np.int8)
 
 
 def held_places(

@@ -53,8 +53,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.work._workers import hire, map_ordered, one_thread
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
@@ -122,7 +121,7 @@ class VerdictChain:
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = bonded(assembly, self._mortar)
-        with one_thread():
+        with _one_thread():
             tries = chain(self._known(assembly, held), self._sought(assembly, case))
             each = ((judged(assembly, case, answer), way) for answer, way in tries)
             known = next(((proven, way) for proven, way in each if proven is not None), None)
@@ -265,17 +264,17 @@ def each_verdict(
             prove(bricks, common)  # a trial: forces that hold it hold all of these
         for step in group:
             key = bricks, step.grips
-            if key not in found:
-                found[key] = _proven_state(*prove(*key)) if bricks else _NOTHING
+            if not bricks:
+                found[key] = _NOTHING
+            elif key not in found:
+                assembly, proven, way = prove(*key)
+                verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+                unproven = int(verdict is Verdict.UNDECIDED)
+                if verdict is Verdict.FALLS:
+                    motion = proven.answer.motion
+                failure = _failure(assembly, motion)
+                found[key] = Stability(verdict, way.value, unproven=unproven, **failure)
             yield found[key]
-
-
-def _proven_state(assembly: Assembly, proven: Proven, way: Way) -> Stability:
-    """Return what a chain proves of a partial structure."""
-    verdict, still = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
-    failure = _failure(assembly, proven.answer.motion if verdict is Verdict.FALLS else still)
-    unproven = int(verdict is Verdict.UNDECIDED)
-    return Stability(verdict, proof=way.value, unproven=unproven, **failure)
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
@@ -298,15 +297,13 @@ def each_stability(
     steps: Sequence[Step],
     mortar: Mortar,
     margins: tuple[str, ...] = (),
-    at: Collection[int] | None = None,
     shared: tuple[Executor | None, int] = (None, 1),
 ) -> Iterator[Stability]:
     """Yield what `assess_steps` returns, as soon as it is found.
 
-    ``at``: numbers of steps with margins, by default all; ``shared``: executor and workers.
+    ``shared``: executor and workers.
     """
-    numbers = {step.number for step in steps} if at is None else at
-    find = partial(_each, mortar=mortar, margins=margins, at=numbers if margins else ())
+    find = partial(_each, mortar=mortar, margins=margins)
     parts = parts_of(network, steps)
     with hire(*shared) as crew:
         if crew is None:
@@ -323,16 +320,12 @@ def _in_worker(parts: bytes, find: _Find, steps: Sequence[Step]) -> tuple[Stabil
 
 
 def _each(
-    parts: PartialAssemblies,
-    steps: Sequence[Step],
-    mortar: Mortar,
-    margins: tuple[str, ...],
-    at: Collection[int],
+    parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, margins: tuple[str, ...]
 ) -> Iterator[Stability]:
-    """Yield the verdicts of steps, with margins of those whose numbers are given."""
+    """Yield the verdicts of steps, with margins if any are asked for."""
     up = parts.network.scene.up
     for step, found in zip(steps, each_verdict(parts, steps, mortar), strict=True):
-        if step.number not in at or not step.bricks:
+        if not margins or not step.bricks:
             yield found
             continue
         whole = assess(parts(step.bricks, step.grips), mortar, up, margins=margins)

@@ -37,7 +37,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     safe_pull,
 )
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, with_progress
 
 STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
 CONES = "cone program"  # what proves a verdict where nothing simpler does

@@ -35,7 +35,7 @@ from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.limit_analysis import horizontal
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -200,7 +200,12 @@ class StandingSets:
         codes = self._codes(held, payload)
 
         def verdicts(rows: Ints) -> Floats:
-            found = self._by_others(bricks, codes[rows])
+            found = np.full(len(rows), np.nan)
+            for other in self._others:  # what verdicts under other requirements imply
+                known = other._known[""].known(bricks, codes[rows])
+                for one, weaker, verdict in ((other, self, STANDS), (self, other, FALLS)):
+                    if all(any(d._implies(w) for d in one._demands) for w in weaker._demands):
+                        found[known == verdict] = verdict
             if len(new := np.flatnonzero(np.isnan(found))):
                 grips = bricks, held[rows[new]], payload[rows[new]]
                 found[new] = np.min([screen.stands(*grips) for screen in self._screens], axis=0)
@@ -208,16 +213,6 @@ class StandingSets:
             return found[:, None]
 
         return self._known[""].of(bricks, codes, verdicts)[:, 0]
-
-    def _by_others(self, bricks: int, codes: Ints) -> Floats:
-        """Return the verdicts (n,) that those under other requirements imply; else NaN."""
-        out = np.full(len(codes), np.nan)
-        for other in self._others:
-            found = other._known[""].known(bricks, codes)
-            for one, weaker, verdict in ((other, self, STANDS), (self, other, FALLS)):
-                if all(any(d._implies(w) for d in one._demands) for w in weaker._demands):
-                    out[found == verdict] = verdict
-        return out
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return brackets (S, 2) of the margins of grip sets, as goals count them."""

@@ -11,7 +11,7 @@ from seqopt.plan.build import GivenSequence
 from seqopt.questions import Built, Steps, find_build
 from seqopt.stability.standing import Standing
 from seqopt.times._step_check import check_cured
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def times(

@@ -11,7 +11,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.graph.graph import Graph
 from seqopt.graph.space import Visited
 from seqopt.graph.states import States
-from seqopt.times._fall_cuts import CuringStates, FallCuts
+from seqopt.times._curing import CuringStates, FallCuts
 from seqopt.times._steps import require_durations
 
 HELD, NOW = -1, -2  # where the readiness of a column comes from: it has none, the end of the act

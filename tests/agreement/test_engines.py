@@ -10,7 +10,7 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.registry import make_engine

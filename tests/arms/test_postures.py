@@ -8,9 +8,9 @@ import pytest
 import seqopt
 from seqopt.arms import find_postures
 from seqopt.arms._judge import PostureRules, check_postures
+from seqopt.arms._kept import plan_postures
 from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
-from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError

@@ -13,9 +13,8 @@ import pytest
 import seqopt
 from seqopt.arms import _model, find_postures
 from seqopt.arms._judge import check_postures
-from seqopt.arms._model import ArmModel
+from seqopt.arms._model import ArmModel, model_path
 from seqopt.arms._permits import permits
-from seqopt.arms._urdf import model_path
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, GripError, SceneError, StepError
 from seqopt.problem.criteria import WorstRatio

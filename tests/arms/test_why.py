@@ -9,8 +9,8 @@ import pytest
 import seqopt
 from seqopt._cli.main import main
 from seqopt.arms import _tables, find_postures
+from seqopt.arms._kept import plan_postures
 from seqopt.arms._permits import reach
-from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._tables import _known
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.steps import Step, StepKind

@@ -5,7 +5,7 @@ import re
 import mujoco
 import numpy as np
 
-from seqopt.arms._urdf import model_path
+from seqopt.arms._model import model_path
 
 STILL = """
 <mujoco><compiler meshdir="{meshes}" strippath="true" discardvisual="true" fusestatic="false"

@@ -16,7 +16,7 @@ from seqopt.errors import TimeUpError
 from seqopt.plan import _answers
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.work.progress import INTERRUPT, TIME, Clock
+from seqopt.work import INTERRUPT, TIME, Clock
 from tests.builders import with_part
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
@@ -100,7 +100,7 @@ def ended(words, when, how=KeyboardInterrupt):
 def test_a_proof_that_is_ended_leaves_what_is_claimed(tmp_path, monkeypatch, words, hows):
     whole = tmp_path / "whole"
     assert main([*words, "--out", str(whole)]) == 0
-    monkeypatch.setattr("seqopt.work.progress.GRACE", math.inf)
+    monkeypatch.setattr("seqopt.work.GRACE", math.inf)
     for how, status in hows.items():
         out = tmp_path / str(status)
         monkeypatch.setattr(_answers, "judge_schedule", Mock(side_effect=how))
@@ -121,7 +121,7 @@ def test_a_proof_that_is_ended_leaves_what_is_claimed(tmp_path, monkeypatch, wor
 def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, words):
     """Whatever comes first, and where nothing is late the same words have an answer."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
+    monkeypatch.setattr("seqopt.work.GRACE", 0.0)
     assert main([*words, "--time-limit", "0"]) == 4
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -148,7 +148,7 @@ def test_a_clock_ends_what_is_late_and_says_why(monkeypatch):
     with pytest.raises(KeyboardInterrupt), clock.needed("b"):
         signal.raise_signal(signal.SIGINT)
     assert clock.tried(partial(signal.raise_signal, signal.SIGINT)) == (None, INTERRUPT)
-    monkeypatch.setattr("seqopt.work.progress.GRACE", 0.0)
+    monkeypatch.setattr("seqopt.work.GRACE", 0.0)
     assert Clock(0.0).tried(lambda: 3) == (None, TIME)
     assert [clock.why(stopped) for stopped in (INTERRUPT, "memory", "")] == [
         *(INTERRUPT, "memory", "")

@@ -154,7 +154,7 @@ def test_it_is_one_line_and_writes_nothing(
     capsys, monkeypatch, scenes, tmp_path, words, said, status
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("seqopt.work.progress.GRACE", 60.0)  # posing is not late on a busy machine
+    monkeypatch.setattr("seqopt.work.GRACE", 60.0)  # posing is not late on a busy machine
     words = re.sub("ARCH|SIX|PLAN", lambda found: str(scenes[found[0]]), words).split()
     more = ["--out", "out"] if words[0] == "optimize" else []
     found, out, err = command(capsys, *words, *more)

@@ -16,7 +16,7 @@ from seqopt._cli.signatures import signature_of
 from seqopt._cli.terminal import complain, show_text
 from seqopt._cli.watcher import Watcher
 from seqopt.errors import ProblemError
-from seqopt.work.progress import Stage
+from seqopt.work import Stage
 
 
 @pytest.fixture

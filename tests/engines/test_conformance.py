@@ -9,7 +9,7 @@ import pytest
 from experiments.harness.scenes import grip_sets
 from seqopt.contact.mortar import DRY, EPOXY, BedStiffness, Mortar, find_elastic_limits
 from seqopt.engines.diagnosis import Finding, diagnose
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES, REASONS, AutoEngine

@@ -254,7 +254,7 @@ def test_who_looks_for_what_cancels(monkeypatch, kind, share, uneven):
     """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
     scene, looked = from_both_sides(7), []
     monkeypatch.setattr(
-        trial, "_cancels", lambda *seen: looked.append(seen[0].bricks) or _cancels(*seen)
+        trial, "_cancels", lambda *seen: looked.append(seen[0].maps.bricks) or _cancels(*seen)
     )
     stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
     grounds = tuple(replace(g, **stiff) for g in scene.grounds)
@@ -605,5 +605,5 @@ def test_the_last_brick_count_but_one_is_recalled():
         for name in ("flexibility", "dead_displacement", "twist", "wrench", "loss"):
             a, b = (getattr(each, name) for each in (found, fresh))
             assert np.abs(a - b).max() <= 1e-11 * np.abs(b).max(), name
-    assert builder.operator(total - 2, held).bricks == total - 2
+    assert builder.operator(total - 2, held).maps.bricks == total - 2
     assert builder.growth.bricks == total - 2

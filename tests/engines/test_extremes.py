@@ -14,18 +14,18 @@ from seqopt.engines.registry import ENGINES
 from seqopt.engines.rigid import _growth
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine, _can_compile, _extremes_in
+from seqopt.engines.rigid.compliance import COMPILES, ComplianceEngine, _extremes_in
 from seqopt.errors import GripError
 from seqopt.network.network import build_network
 from seqopt.responses._grip_sets import Block, answer
 from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
-from seqopt.work._workers import one_thread
+from seqopt.work import _one_thread
 from tests.builders import apart, from_both_sides, hinged, six_bricks, small_arch
 from tests.direct_solve import solve_dense
 from tests.limit_scenes import chain, loosened
 
-needs_numba = pytest.mark.skipif(not _can_compile(), reason="no numba")
+needs_numba = pytest.mark.skipif(not COMPILES, reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 CLOSE = 1e-12  # of what is largest
@@ -118,7 +118,7 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
     sets, found = sets_of(network, 60, 3), []
     for threads in (1, 3):
         for module in ("_extremes", "_growth"):
-            name = f"seqopt.engines.rigid.{module}.cores"
+            name = f"seqopt.engines.rigid.{module}._cores"
             monkeypatch.setattr(name, lambda threads=threads: threads)
         monkeypatch.setattr(_growth, "_AT_ONCE", 2**12)
         engine = ComplianceEngine(network)
@@ -130,12 +130,13 @@ def test_no_number_depends_on_how_many_threads_share_the_sets(monkeypatch):
 def test_blocks_answer_responses_by_them(compiled):
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = np.sort(sets_of(engine.network, 6, 2, 50), axis=1)
-    found = answer(engine, Block(6, sets, tuple(sorted(EXTREMES)), compiled=compiled))
+    names = tuple(sorted(EXTREMES))
+    found = answer(engine, Block(6, sets, names, compiled=compiled))
     fields = engine.solve(6, sets, Want.RESPONSES)
-    for name, values in found.values.items():
+    for name, values in zip(names, found.T, strict=False):
         true = CHOSEN_BY[name].of(engine.network, fields)
         assert np.abs(values - true).max() <= CLOSE * max(np.abs(true).max(), 1e-9)
-    assert np.abs(found.forces - lengths(fields.grip_force)).max() <= 1e-9
+    assert np.abs(found[:, len(names) :] - lengths(fields.grip_force)).max() <= 1e-9
 
 
 @needs_numba
@@ -157,7 +158,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
 
 
 def test_without_numba_fields_answer(monkeypatch):
-    monkeypatch.setattr("seqopt.engines.rigid.compliance._can_compile", lambda: False)
+    monkeypatch.setattr("seqopt.engines.rigid.compliance.COMPILES", False)
     monkeypatch.setitem(sys.modules, "seqopt.engines.rigid._extremes", None)  # not imported
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = sets_of(engine.network, 6, 2, 10)
@@ -182,10 +183,10 @@ def two_threads():
 
 
 def test_one_thread_inside_and_two_after(two_threads):
-    with one_thread():
+    with _one_thread():
         assert threads() == {1}
     assert threads() == {2}
-    with pytest.raises(ZeroDivisionError), one_thread():
+    with pytest.raises(ZeroDivisionError), _one_thread():
         _ = 1 / 0
     assert threads() == {2}
 

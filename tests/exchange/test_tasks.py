@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt._files import write_file
-from seqopt.arms._plan_postures import PlanPostures
+from seqopt.arms._kept import PlanPostures
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._content import Given
 from seqopt.exchange._grip_frames import hold

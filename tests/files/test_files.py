@@ -12,7 +12,7 @@ import pytest
 from seqopt import _files as files
 from seqopt._files import read_text, require_apart, require_folder, write_file, write_folder
 from seqopt.errors import FileError
-from seqopt.work.progress import answered, ending
+from seqopt.work import _answered, _ending
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")
 
@@ -147,7 +147,7 @@ def test_a_first_interrupt_is_a_call_and_a_second_one_ends():
     calls = []
 
     def work():
-        with answered(lambda: calls.append(1)):
+        with _answered(lambda: calls.append(1)):
             signal.raise_signal(signal.SIGINT)
             calls.append(2)
             signal.raise_signal(signal.SIGINT)
@@ -155,7 +155,7 @@ def test_a_first_interrupt_is_a_call_and_a_second_one_ends():
     with pytest.raises(KeyboardInterrupt):
         work()
     assert calls == [1, 2]
-    with answered(lambda: calls.append(3)):
+    with _answered(lambda: calls.append(3)):
         pass
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
@@ -164,7 +164,7 @@ def test_signals_that_others_answer_are_left_to_them():
     came = []
     before = signal.signal(signal.SIGINT, lambda *_: came.append("theirs"))
     try:
-        with answered(lambda: came.append("ours")):
+        with _answered(lambda: came.append("ours")):
             signal.raise_signal(signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
@@ -177,7 +177,7 @@ def wait():
 
 
 def test_what_takes_too_long_ends():
-    with pytest.raises(TimeoutError), ending(0.01):
+    with pytest.raises(TimeoutError), _ending(0.01):
         wait()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
@@ -186,9 +186,9 @@ def test_what_takes_too_long_ends_where_interrupts_are_ignored():
     """As in a background job: an end comes, an interrupt does not."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with ending(100.0):
+        with _ending(100.0):
             signal.raise_signal(signal.SIGINT)
-        with pytest.raises(TimeoutError), ending(0.01):
+        with pytest.raises(TimeoutError), _ending(0.01):
             wait()
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
@@ -197,7 +197,7 @@ def test_what_takes_too_long_ends_where_interrupts_are_ignored():
 
 @pytest.mark.parametrize("seconds", [1e300, float("inf")])
 def test_an_end_leaves_what_is_in_time_and_interrupts_of_others(seconds):
-    with ending(seconds):
+    with _ending(seconds):
         pass
-    with pytest.raises(KeyboardInterrupt), ending(seconds):
+    with pytest.raises(KeyboardInterrupt), _ending(seconds):
         signal.raise_signal(signal.SIGINT)

@@ -24,7 +24,7 @@ from seqopt.problem.problem import WORST_TOTAL, Orders, cvar
 from seqopt.responses import Resources
 from seqopt.sequence.rules import FreeRules
 from seqopt.stability.standing import Standing, slack
-from seqopt.work.progress import Stage
+from seqopt.work import Stage
 from tests.builders import small_arch
 from tests.strategies import free_builds
 

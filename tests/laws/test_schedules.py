@@ -15,7 +15,7 @@ from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.arrays import skew
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine

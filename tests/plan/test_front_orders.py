@@ -168,10 +168,10 @@ def test_that_no_order_has_a_plan_is_proven():
 
 
 def test_what_does_not_fit_is_one_line(monkeypatch):
-    monkeypatch.setattr(fronts, "free_memory", lambda: 0.0)
+    monkeypatch.setattr(fronts, "_free_memory", lambda: 0.0)
     with pytest.raises(ProblemError, match="do not fit the memory; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
-    monkeypatch.setattr(fronts, "free_memory", lambda: np.inf)
+    monkeypatch.setattr(fronts, "_free_memory", lambda: np.inf)
     monkeypatch.setattr("seqopt.graph._spaces.MOST_PARTS", 3)
     with pytest.raises(TooManySetsError, match="more than 3 sets of bricks; give an order"):
         find_front(posed(AIMS[0], orders="tied"))

@@ -20,8 +20,8 @@ import numpy as np
 
 import seqopt
 from seqopt._files import parse_json, read_text
-from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
+from seqopt.arms._tables import PostureTable
 from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
 from seqopt.exchange._formats import read_file

@@ -13,7 +13,7 @@ from seqopt.plan.solve import graph_of, pose
 from seqopt.responses import _grip_sets as batches
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.study import EQUATIONS
-from seqopt.work._workers import keep
+from seqopt.work import _keep
 
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
@@ -38,7 +38,7 @@ def evaluated(schedule, resources):
     engine = make_engine("auto", schedule.scene)
     graph = graph_of(pose(engine, schedule, EQUATIONS, resources=resources))
     levels = [k for k in range(1, graph.space.levels + 1) if graph.space.open_columns(k)]
-    with keep(resources.executor, resources.workers):
+    with _keep(resources.executor, resources.workers):
         every = [graph.seen(k, graph.space.candidates(k).states).responses for k in levels]
     return np.concatenate([own[name] for own in every for name in sorted(own)])
 

@@ -107,7 +107,7 @@ def test_a_motion_rules_out_every_set_that_it_leaves_at_rest(arch25):
     screen = Screen(network, DRY)
     assert screen.stands(14, [[2, 28]]) == FALLS
     sets = pairs_and_triples(14)
-    states = screen._upright((14, True))
+    states = screen._proofs.upright[(14, True), DRY]
     known = states.known.bracket(*held_places(network, 14, sets, None))
     ruled_out = known[:, 0] > EXACT
     assert screen.solved == states.solved <= 2

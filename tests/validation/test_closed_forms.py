@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import DRY, BedStiffness, Mortar
-from seqopt.engines.discrete.engine import DiscreteEngine, _build_system, _held_nodes, _settle
+from seqopt.engines.discrete import DiscreteEngine, _build_system, _held_nodes, _settle
 from seqopt.engines.interface import RIGID, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError

@@ -196,7 +196,7 @@ def test_weight_loads_and_movements_add_up(kind):
             ]
             total = answers[0]
             for other in answers[1:]:
-                total = type(total)(**{n: getattr(total, n) + getattr(other, n) for n in NAMES})
+                total = replace(total, **{n: getattr(total, n) + getattr(other, n) for n in NAMES})
             together = ComplianceEngine(scene).solve(bricks, [grips], Want.ALL)
             assert apart(together, total) < 1e-9
             assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)
@@ -206,7 +206,7 @@ def test_a_factor_on_weight_is_a_factor_on_answers():
     scene = SCENES["arch"]()
     heavy = replace(scene, weight_factor=1.35)
     once, more = (ComplianceEngine(s).solve(9, [[17]], Want.ALL) for s in (scene, heavy))
-    assert apart(more, type(once)(**{n: 1.35 * getattr(once, n) for n in NAMES})) < 1e-10
+    assert apart(more, replace(once, **{n: 1.35 * getattr(once, n) for n in NAMES})) < 1e-10
     assert heavy.up == scene.up
 
 

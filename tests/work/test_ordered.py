@@ -12,8 +12,9 @@ from functools import partial
 
 import pytest
 
+from seqopt import work
 from seqopt.errors import SolverError, WorkerError
-from seqopt.work import Progress, _workers, hire, map_ordered
+from seqopt.work import Progress, hire, map_ordered
 from tests.builders import ROOT
 from tests.work.tasks import die_once, die_while_sending, own_error, square, square_or_fail
 
@@ -78,7 +79,7 @@ def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
     monkeypatch.setattr(threading, "excepthook", lambda seen_: seen.append(seen_.exc_type))
     with hire(workers=2) as crew:
         if cancels:  # as calls of an executor of others
-            monkeypatch.setattr(_workers, "_Processes", type(None))
+            monkeypatch.setattr(work, "_Processes", type(None))
         results = map_ordered(time.sleep, (0.0, *[30.0] * 20), crew)
         next(results)
         time.sleep(0.5)  # until the pool has nothing to do but wait

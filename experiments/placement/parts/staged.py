@@ -146,7 +146,7 @@ def state_fields(parts: Ungripped, state: StagedState) -> Fields:
         displacement=(parts.motion @ state.twist).reshape(1, -1, 3)
         + parts.network.ground_motion(state.bricks),
         grip_force=borne[..., :3].copy(),
-        support=reactions(parts.network, parts.statics, state.wrench[None]),
+        support=reactions(parts.network, state.wrench[None]),
         joint_wrench=state.wrench[None].copy(),
         brick_twist=state.twist.reshape(1, -1, 6).copy(),
         grip_moment=borne[..., 3:].copy(),
@@ -180,7 +180,7 @@ def _loaded(
     load += np.repeat(0.5 * applied[:, :3], 2, axis=0)
     force = solution.force.copy()
     load[columns] += force[0]
-    carried = edge_forces(network, parts.statics, solution.wrench, load[None])
+    carried = edge_forces(network, solution.wrench, load[None])
     split_pairs(network, columns[None], force, carried, solution.compliant)
     twist, wrench = state.twist + solution.twist[0], state.wrench + solution.wrench[0]
     borne = np.concatenate([force, solution.moment], axis=2)[0]

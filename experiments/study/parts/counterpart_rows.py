@@ -18,7 +18,7 @@ from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, v
 from experiments.harness.ranks import rank_choice
 from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
 from seqopt.arrays import Floats
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.network import build_network
 from seqopt.plan.solve import pose

@@ -21,7 +21,7 @@ from seqopt.responses._faults import _with_faults, analyze_each
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.responses.table import LinearRange, what_was_enough
 from seqopt.sequence.steps import _idle_note
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, with_progress
 
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 

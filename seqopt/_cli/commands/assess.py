@@ -27,7 +27,7 @@ from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import AXES, _settlement_said, failure_map
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, with_progress
 
 MAP = Later("seqopt.report._failures")  # 24 ms, of pages
 FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written

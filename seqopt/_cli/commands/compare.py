@@ -19,7 +19,7 @@ from seqopt.report.comparison import Comparison, _printed_largest, format_compar
 from seqopt.responses.table import builds_in_words
 from seqopt.stability.failure_map import find_prover
 from seqopt.study import find_criterion
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import DEFAULTS
 
 SPEED = "Speed against regret"

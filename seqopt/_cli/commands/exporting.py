@@ -14,7 +14,7 @@ from seqopt._files import write_file
 from seqopt.arms._kept import arm_faults
 from seqopt.exchange._formats import formats
 from seqopt.exchange.exports import export
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def run(asked: Annotated[Call, ("call", export)], *, out: File = None, progress: Tell) -> Answer:

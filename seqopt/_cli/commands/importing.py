@@ -17,7 +17,7 @@ from seqopt.exchange.imports import import_scene
 from seqopt.problem.requirements import number_word
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def run(

@@ -18,7 +18,7 @@ from seqopt.errors import ProblemError
 from seqopt.instances._files import WRITERS, save_instance
 from seqopt.instances.compiled import instance
 from seqopt.instances.model import Instance
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 OUTPUT = re.compile(r" (--(quiet|json|out[= ]('[^']*'|\S+))|'--out=[^']*')(?= |$)")
 

@@ -27,7 +27,7 @@ from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.steps import _idle_note
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts, find_prover
 from seqopt.study import paper_models
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import Robust, optimize
 
 FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written

@@ -26,7 +26,7 @@ from seqopt.responses.table import Departure, LinearRange, analyze_builds, build
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.stability.failure_map import BuildVerdicts, find_prover
-from seqopt.work.progress import INTERRUPT, Tell
+from seqopt.work import INTERRUPT, Tell
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal

@@ -11,7 +11,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt._files import csv_text
 from seqopt.arms._permits import reach, reach_described
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def run(asked: Annotated[Call, ("call", reach)], *, out: Folder = None, progress: Tell) -> Answer:

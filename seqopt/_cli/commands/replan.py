@@ -20,7 +20,7 @@ from seqopt.responses.quantities import length_text
 from seqopt.scene.scenarios import SAME
 from seqopt.sequence.part import plan_folder
 from seqopt.sequence.rules import FREE
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import optimize
 
 

@@ -15,7 +15,7 @@ from seqopt._files import PAGE
 from seqopt.engines.registry import engine_mortar
 from seqopt.plan.build import ShownBuild
 from seqopt.report._questions import own_engine, report
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 
 def run(

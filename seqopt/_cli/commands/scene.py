@@ -17,7 +17,7 @@ from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.sequence.part import find_scene
-from seqopt.work.progress import Tell, with_progress
+from seqopt.work import Tell, with_progress
 
 
 def run(

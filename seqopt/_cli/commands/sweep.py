@@ -17,7 +17,7 @@ from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan.plan import Plan
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.report.sweep import MOST, spread, sweep
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 from seqopt.workflow import optimize
 
 ROWS = "sweep.csv"

@@ -20,7 +20,7 @@ from seqopt.report._folders import figure_notes, picture_files
 from seqopt.sequence.steps import _idle_note
 from seqopt.times._build import times
 from seqopt.times._tables import busy_table
-from seqopt.work.progress import Tell
+from seqopt.work import Tell
 
 _SPENT = ("prepares", "acts", "holds", "idle")  # how a robot spends its time
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"

@@ -35,7 +35,7 @@ from seqopt.engines.rigid._operator import (
     solve_positive,
     well_conditioned,
 )
-from seqopt.work._workers import cores, in_threads, one_thread
+from seqopt.work import _cores, _in_threads, _one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
@@ -135,7 +135,7 @@ class GrownExtremes:
         """Let a number of bricks stand."""
         if bricks == self._part.bricks == self._growth.bricks:
             return
-        with one_thread():
+        with _one_thread():
             self._growth.reach(bricks)
         network, (twist, _, nodes) = self._network, self._grown
         acting = int(np.searchsorted(network.springs.since, bricks, side="right"))
@@ -168,9 +168,9 @@ class GrownExtremes:
             squares: Floats = reduce_sets(grown, maps, part, columns[own], force[own])
             return squares
 
-        step = max(_SETS, -(-len(columns) // cores()))
+        step = max(_SETS, -(-len(columns) // _cores()))
         parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
-        found = np.concatenate(in_threads(reduce, parts), axis=1)
+        found = np.concatenate(_in_threads(reduce, parts), axis=1)
         np.sqrt(found[2:], out=found[2:])
         size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
         return found, size, apart | ~np.isfinite(found).all(axis=0)

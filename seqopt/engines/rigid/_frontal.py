@@ -37,7 +37,6 @@ from seqopt.engines.rigid._mixed import (
     borne,
     held_rows,
     respond,
-    share,
     sizes,
     ungripped_system,
     unscaled,
@@ -45,7 +44,7 @@ from seqopt.engines.rigid._mixed import (
 from seqopt.engines.rigid._operator import ResponseMaps, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
-from seqopt.work._workers import one_thread
+from seqopt.work import _one_thread
 
 AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
 _SHRINKING = 1e-4  # largest correction from which on the next ones are foreseen
@@ -194,9 +193,8 @@ class FrontalSystem:
     """Answers few grip sets of large structures, best by ascending brick counts."""
 
     def __init__(self, network: Network, at_once: int = AT_ONCE) -> None:
-        self._network, self._shared, self._maps = network, share(network), scene_maps(network)
-        whole = ungripped_system(network, len(network.inner), self._shared)
-        self._factor = FrontalFactor(whole, at_once)
+        self._network, self._maps = network, scene_maps(network)
+        self._factor = FrontalFactor(ungripped_system(network, len(network.inner)), at_once)
         self._last: tuple[Ungripped, sparse.csr_array] | None = None  # of the last brick count
 
     def solve(
@@ -209,16 +207,16 @@ class FrontalSystem:
         """
         network = self._network
         if self._last is None or self._last[0].bricks != bricks:
-            parts = ungripped_system(network, bricks, self._shared)
+            parts = ungripped_system(network, bricks)
             self._last = parts, ResponseMaps(self._maps, bricks).motion
         parts, motion = self._last
         answers = [no_sets(network, bricks, columns.shape[1])]
-        with one_thread():
+        with _one_thread():
             self._factor.reach(bricks)
             for i, held in enumerate(columns):
                 own = compliance.select(slice(i, i + 1))
                 solution = _solve_one(parts, self._factor, held, own, largest)
-                answers.append(respond(network, parts.statics, motion, held[None], solution))
+                answers.append(respond(network, motion, held[None], solution))
         return _join_sets(answers)
 
 

@@ -25,7 +25,7 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.work._workers import cores, in_threads
+from seqopt.work import _cores, _in_threads
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
@@ -326,7 +326,7 @@ def _add_products(targets: Sequence[Floats], left: Floats, changes: Sequence[Flo
     """Add to matrices (n, m) products of one (n, p) with others (p, m), a few rows at a time."""
     step = max(1, _AT_ONCE // max(target.shape[1] for target in targets))
     starts = range(0, len(left), step)
-    threads = min(cores(), len(starts) // _LEAST)
+    threads = min(_cores(), len(starts) // _LEAST)
 
     def add(first: int) -> None:
         rooms = np.empty(step * max(target.shape[1] for target in targets))
@@ -336,4 +336,4 @@ def _add_products(targets: Sequence[Floats], left: Floats, changes: Sequence[Flo
                 part = target[start : start + step]
                 part += np.matmul(some, change, out=rooms[: part.size].reshape(part.shape))
 
-    in_threads(add, range(max(threads, 1)))
+    _in_threads(add, range(max(threads, 1)))

@@ -36,8 +36,7 @@ from seqopt.network._mechanics import (
     spread,
 )
 from seqopt.network.network import Network
-from seqopt.scene._checks import settle
-from seqopt.work._workers import one_thread
+from seqopt.work import _one_thread
 
 LAST_CORRECTION = 1e-10  # of exact answers: of forces, moments, shifts, turns, relative to each
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
@@ -69,7 +68,7 @@ class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
     ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
-    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled, of the
+    ``network.inner``, m; ``deformation`` (6s, 6b): scaled, of the
     acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
     ``load`` (6b,): weight and loads, scaled; ``moved`` (6s,): what the ground's movement adds to
     the joints' equations; ``acting`` (s,); ``twist_unit`` (6b,), ``wrench_unit`` (6s,): scaled
@@ -79,7 +78,6 @@ class Ungripped(FrozenValue):
     network: Network
     bricks: int
     inner: sparse.csr_array
-    statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
     load: Floats
@@ -122,19 +120,24 @@ class Ungripped(FrozenValue):
 
 def share(network: Network) -> Shared:
     """Return the system of the whole scene, of which those of all brick counts are parts."""
+    known: Shared | None = network.derived.get("mixed")
+    if known is not None:
+        return known
     springs, size = network.springs, network.inner.size
     brick = np.repeat(np.arange(len(network.inner)), 2)
     moved = point_motion(network.node_position[network.inner.ravel()] - network.centroid[brick])
     inner = spread(np.arange(size), brick, moved, (size, len(network.inner)))
     gap = deformation(springs.bodies, springs.position, network.centroid, springs.axes)
     shift = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))
-    return Shared(build_statics(network), gap, inner, shift.reshape(-1, 6))
+    network.derived["mixed"] = found = Shared(
+        build_statics(network), gap, inner, shift.reshape(-1, 6)
+    )
+    return found
 
 
-def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
+def ungripped_system(network: Network, bricks: int) -> Ungripped:
     """Return the part that all systems of a partial structure share."""
-    shared = share(network) if shared is None else shared
-    springs = network.springs
+    shared, springs = share(network), network.springs
     acting = springs.acting(bricks)
     steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
     length = float(np.linalg.norm(steps, axis=2).max())
@@ -159,7 +162,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         network=network,
         bricks=bricks,
         inner=inner,
-        statics=shared.statics,
         deformation=sparse.csr_array(scaled, shape=(rows, size)),
         stiffness=stiffness,
         load=inner.T @ weight / unit + applied * twist_unit / unit,
@@ -181,13 +183,13 @@ def free_motion(
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
-    turned = columns[compliance.transmits(1, len(columns))[0]] // 2
+    turned = columns[compliance.transmits(len(columns))] // 2
     turns = (6 * turned[:, None] + np.arange(3, 6)).ravel()  # that grips resist
     resisted = np.zeros((len(turns), 6 * bricks))
     resisted[np.arange(len(turns)), turns] = 1.0
     held = np.vstack([parts.motion[node.ravel()].toarray(), resisted]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
-    with one_thread():
+    with _one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
     if len(sizes) == ties.shape[1] and sizes[-1] > _UNTIED * sizes[0]:
         return None
@@ -235,68 +237,59 @@ class Solution(FrozenValue):
     twist: Floats
     wrench: Floats
     force: Floats
-    moment: Floats = None  # type: ignore[assignment]  # none where none is given
-    compliant: Bools | None = None
-
-    def __post_init__(self) -> None:
-        if self.moment is None:
-            settle(self, moment=np.zeros_like(self.force))
-        super().__post_init__()
+    moment: Floats
+    compliant: Bools
 
 
 def respond(
-    network: Network,
-    statics: Statics,
-    motion: Floats | sparse.csr_array,
-    columns: Ints,
-    solution: Solution,
+    network: Network, motion: Floats | sparse.csr_array, columns: Ints, solution: Solution
 ) -> Fields:
     """Return the fields of grip sets, of which ``motion`` is as `node_motion` returns it."""
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
     load = np.tile(network.inner_load(bricks), (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
-    carried = edge_forces(network, statics, wrench, load)
+    carried = edge_forces(network, wrench, load)
     split_pairs(network, columns, force, carried, solution.compliant)
     moved = (motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3)
     return Fields(
         edge_force=carried,
         displacement=moved + network.ground_motion(bricks),
         grip_force=force,
-        support=reactions(network, statics, wrench),
+        support=reactions(network, wrench),
         joint_wrench=wrench,
         brick_twist=twist.reshape(sets, bricks, 6),
         grip_moment=solution.moment,
     )
 
 
-def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
+def edge_forces(network: Network, wrench: Floats, load: Floats) -> Floats:
     """Return the edge forces (S, E), tension positive.
 
     ``wrench``: as of `Solution`; ``load`` (S, 2b, 3): at the inner nodes, forces of grips included.
     """
     sets, bricks = len(load), load.shape[1] // 2
-    edges = network.count_edges(bricks)
+    statics, edges = share(network).statics, network.count_edges(bricks)
     through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
     carried = (statics.edge_of_spring[:edges] @ through.T).T
     carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
     return np.asarray(carried)
 
 
-def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
+def reactions(network: Network, wrench: Floats) -> Floats:
     """Return force and moment (S, G, 6) of every ground end about its fixed point."""
     at_spring = wrench[:, network.springs.support]
-    return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
+    moment = share(network).statics.support_of_spring
+    return np.asarray(np.einsum("gij,sgj->sgi", moment, at_spring))
 
 
 def split_pairs(
-    network: Network, columns: Ints, force: Floats, carried: Floats, compliant: Bools | None = None
+    network: Network, columns: Ints, force: Floats, carried: Floats, compliant: Bools
 ) -> None:
     """Let each of two rigid grips on one brick take the force at its own node, in place.
 
     ``force`` (S, r, 3), ``carried`` (S, E): of grips and edges; ``compliant`` (S, r): soft grips.
     """
-    compliant = np.zeros(columns.shape, dtype=bool) if compliant is None else compliant
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
     edge_of[network.edge_brick[inner]] = inner
@@ -374,7 +367,7 @@ def _with_flexibility(
     those of moments, over the lever.
     """
     network, count = parts.network, len(grips)
-    yields, turns = compliance.compliant(1, count)[0], compliance.transmits(1, count)[0]
+    yields, turns = compliance.compliant(1, count)[0], compliance.transmits(count)
     own = compliance.transmitted[0]
     width = own.shape[2]
     between = []
@@ -448,7 +441,7 @@ def solve_mixed(
     for i, grips in enumerate(columns):
         own = compliance.select(slice(i, i + 1))
         solution = solve_load(parts, grips, parts.load, parts.moved, own)
-        answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
+        answers.append(respond(network, parts.motion, grips[None], solution))
     return _join_sets(answers)
 
 
@@ -516,9 +509,7 @@ def _corrected(
     return result, bool(unchanged(parts, state, changes, _SENSITIVE).all())
 
 
-def borne(
-    force: Floats, grips: int, compliance: GripCompliance
-) -> tuple[Floats, Floats, Bools | None]:
+def borne(force: Floats, grips: int, compliance: GripCompliance) -> tuple[Floats, Floats, Bools]:
     """Return forces, N, and moments, N m, of grips (S, r, 3), and which are compliant.
 
     ``force`` (S, rw): of each grip, then its moments over the lever if grips transmit any.

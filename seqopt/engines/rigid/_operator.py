@@ -174,11 +174,6 @@ class ComplianceOperator(FrozenValue):
     moments: int = 0  # of each brick that is loaded
 
     @property
-    def bricks(self) -> int:
-        """How many stand, b."""
-        return self.maps.bricks
-
-    @property
     def width(self) -> int:
         """How many unknowns each grip has: forces, and then moments."""
         return 3 + self.moments
@@ -197,7 +192,7 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def place(self) -> Ints:
         """Which of the bricks that are loaded each is, (b,); -1 of one that is not."""
-        out = np.full(self.bricks, -1)
+        out = np.full(self.maps.bricks, -1)
         out[self.held] = np.arange(len(self.held))
         return frozen(out)
 
@@ -215,11 +210,9 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def doubts(self) -> Doubts:
         """What rounding may leave of the answers to its loads."""
-        return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
-
-    def covers(self, bricks: Ints) -> bool:
-        """Return whether loads act at the nodes of bricks."""
-        return len(self.held) == self.bricks or not np.count_nonzero(self.place.take(bricks) < 0)
+        own = np.arange(len(self.flexibility))
+        diagonal = self.flexibility[own, own % self.flexibility.shape[1]]
+        return Doubts(diagonal, self.dead_displacement, self.loss)
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
@@ -228,10 +221,6 @@ class ComplianceOperator(FrozenValue):
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return rows
-
-    def entries(self, rows: Ints) -> Ints:
-        """Return where the flexibility has entries of loads (k, S), (k, k, S)."""
-        return np.asarray(rows[:, None] * len(self.flexibility) + rows)
 
     def weight_rows(self, index: Ints) -> Ints | int:
         """Return which row is the weight, of sets with loads (S, k)."""
@@ -253,7 +242,7 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches determine.
         """
-        few = are_few(3 * self.bricks, len(index))  # independent of earlier requests
+        few = are_few(3 * self.maps.bricks, len(index))  # independent of earlier requests
         loads = self.loads(index, force)
         return {
             name: np.asarray(loads @ self.of_loads(name))
@@ -264,7 +253,7 @@ class ComplianceOperator(FrozenValue):
 
     def _mapped(self, name: str, index: Ints, force: Floats) -> Floats:
         """Return a field of sets whose twists and wrenches are summed first."""
-        states = self._states(name)
+        states = self.twist if name in _OF_TWISTS else self.wrench
         out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
@@ -283,15 +272,11 @@ class ComplianceOperator(FrozenValue):
                 out[np.arange(len(index)), edge[brick[:, i]]] += along[:, i]
         return out
 
-    def of_loads(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), made when first asked for."""
-        if name not in self._made:
-            self._made[name] = frozen(self._of_loads(name))
-        return self._made[name]
-
-    def _of_loads(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), which is not kept."""
-        out = self.maps.apply(name, self._states(name))
+    def of_loads(self, name: str, *, keep: bool = True) -> Floats:
+        """Return a field under every load, (l + 1, Q); kept from when it is first asked for."""
+        if name in self._made:
+            return self._made[name]
+        out = self.maps.apply(name, self.twist if name in _OF_TWISTS else self.wrench)
         if name == "edge_force":
             edge, axis, pull = self.maps.inner
             out[-1, edge] += pull
@@ -300,15 +285,13 @@ class ComplianceOperator(FrozenValue):
             out[rows, edge[self.held][:, None]] += axis[self.held]
         if name == "displacement":
             out[-1] += self.maps.ground
+        if keep:
+            self._made[name] = frozen(out)
         return out
 
     @cached_property
     def _made(self) -> dict[str, Floats]:
         return {}
-
-    def _states(self, name: str) -> Floats:
-        """Return the unknowns from which a field follows: twists or wrenches."""
-        return self.twist if name in _OF_TWISTS else self.wrench
 
 
 def are_few(unknowns: int, sets: int) -> bool:
@@ -387,11 +370,6 @@ class Pairs(NamedTuple):
     second: Ints
     brick: Ints
     axis: Floats
-
-    def within(self, start: int, end: int) -> Pairs:
-        """Return those of some sets, counted from the first of these."""
-        found = self.only((self.sets >= start) & (self.sets < end))
-        return found._replace(sets=found.sets - start)
 
     def only(self, which: Bools) -> Pairs:
         """Select pairs."""
@@ -564,9 +542,9 @@ def undone(
     """
     count, sets = rows.shape
     system = np.empty((count + 1, count, sets))
-    operator.flexibility.take(
-        operator.entries(rows), out=system[:count], mode="clip"
-    )  # others copy once more
+    loads = operator.flexibility.shape[1]  # of several scenarios, those of each stand apart
+    entries = rows[:, None] * loads + rows % loads
+    operator.flexibility.take(entries, out=system[:count], mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     nodes = count - operator.loose

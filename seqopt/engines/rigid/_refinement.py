@@ -32,7 +32,6 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
-    Shared,
     Solution,
     Ungripped,
     bordered,
@@ -137,37 +136,6 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     return sparse.csr_array(rows)
 
 
-def _held_operator(
-    system: _HeldSystem, inner: sparse.csr_array | None = None
-) -> ComplianceOperator:
-    """Return the operator of a structure whose loose motions are unknowns, with loads of their own.
-
-    ``inner`` (l, 6b): what loads do to scaled twists; by default forces at the inner nodes.
-    """
-    parts, loose = system.parts, system.loose
-    inner = parts.inner if inner is None else inner
-    joints, loads = len(parts.wrench_unit), inner.shape[0]
-    right = np.zeros((loads + loose, joints + 6 * parts.bricks))
-    right[:loads, joints:] = inner.toarray() / parts.unit
-    states, pull = system.solve(right, np.eye(loads + loose, loose, -loads))
-    motion = (inner @ states[:, joints:].T).T
-    reach, resistance = motion[loads:], pull[loads:]
-    softness = 0.0  # of the springs that loose motions stand on, m/N
-    if loose:
-        # about that of the structure where they reach, so that equations keep their digits; one
-        # that reaches no node, as of bricks that turn about the line they lie on, counts as one
-        own = np.trace(motion[:loads]) / max(float((reach**2).sum()), float(loose))
-        most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
-        softness = min(max(float(own), 1 / parts.unit), most)
-    states[:loads] += softness * (reach.T @ states[loads:])
-    flexibility = np.zeros((loads + loose, loads + loose))
-    flexibility[:loads, :loads] = motion[:loads] + softness * (reach.T @ reach)
-    flexibility[loads:, :loads], flexibility[:loads, loads:] = reach, reach.T
-    corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
-    flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
-    return _operator(parts, states, flexibility, softness, loose)
-
-
 def _operator(
     parts: Ungripped, states: Floats, flexibility: Floats, softness: float, loose: int
 ) -> ComplianceOperator:
@@ -202,11 +170,9 @@ class Refinement:
     ``tied``: whether springs are known to tie every brick to the ground.
     """
 
-    def __init__(
-        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
-    ) -> None:
+    def __init__(self, network: Network, bricks: int, *, tied: bool = False) -> None:
         self.network, self.bricks = network, bricks
-        self.parts = ungripped_system(network, bricks, shared)
+        self.parts = ungripped_system(network, bricks)
         self.held = _HeldSystem(self.parts, tied=tied)
         size = 6 * bricks
         self.inner = self.parts.inner  # loads on scaled twists, (l, 6b), as of `load_rows`
@@ -221,8 +187,28 @@ class Refinement:
 
     @cached_property
     def own(self) -> ComplianceOperator:
-        """Of all nodes and directions, from the factored system; for where something is loose."""
-        return _held_operator(self.held, self.inner)
+        """Of all nodes and directions, from the factored system; loose motions are unknowns."""
+        parts, loose, inner = self.parts, self.held.loose, self.inner
+        joints, loads = len(parts.wrench_unit), inner.shape[0]
+        right = np.zeros((loads + loose, joints + 6 * parts.bricks))
+        right[:loads, joints:] = inner.toarray() / parts.unit
+        states, pull = self.held.solve(right, np.eye(loads + loose, loose, -loads))
+        motion = (inner @ states[:, joints:].T).T
+        reach, resistance = motion[loads:], pull[loads:]
+        softness = 0.0  # of the springs that loose motions stand on, m/N
+        if loose:
+            # about that of the structure where they reach, so that equations keep their digits; one
+            # that reaches no node, as of bricks that turn about the line they lie on, counts as one
+            own = np.trace(motion[:loads]) / max(float((reach**2).sum()), float(loose))
+            most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
+            softness = min(max(float(own), 1 / parts.unit), most)
+        states[:loads] += softness * (reach.T @ states[loads:])
+        flexibility = np.zeros((loads + loose, loads + loose))
+        flexibility[:loads, :loads] = motion[:loads] + softness * (reach.T @ reach)
+        flexibility[loads:, :loads], flexibility[:loads, loads:] = reach, reach.T
+        corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
+        flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
+        return _operator(parts, states, flexibility, softness, loose)
 
     def solve(
         self,
@@ -270,7 +256,7 @@ class _Corrector:
         wrench, twist = unscaled(parts, states[done])
         mine = compliance.select(done)
         solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
-        fields = respond(network, parts.statics, operator.maps.motion, columns[done], solution)
+        fields = respond(network, operator.maps.motion, columns[done], solution)
         if done.all():
             return fields
         rest = compliance.select(~done)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Floats, Ints, frozen
 from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
-from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
+from seqopt.engines.rigid._operator import ComplianceOperator
 from seqopt.engines.rigid.compliance import (
     _LARGE,
     ComplianceEngine,
@@ -48,42 +48,28 @@ class StackedOperator(ComplianceOperator):
         arrays = flexibility, dead, none, none
         return cls(first.held, *arrays, first.maps, loss, parts=tuple(parts))
 
-    @property
-    def _rows(self) -> int:
-        return int(self.flexibility.shape[1])
-
     @cached_property
     def inner(self) -> tuple[Ints, Floats]:
         """The inner edges of bricks (Wb,) and their directions (Wb, 3), scenario by scenario."""
         edges, axes = zip(*(each.inner for each in self.parts), strict=True)
         return frozen((np.concatenate(edges), np.concatenate(axes)))
 
-    @cached_property
-    def doubts(self) -> Doubts:
-        """What rounding may leave of the answers, (WB,)."""
-        own = np.arange(len(self.flexibility))
-        diagonal = self.flexibility[own, own % self._rows]
-        return Doubts(diagonal, self.dead_displacement, self.loss)
-
     def load_index(self, columns: Ints) -> Ints:
-        part, own = np.divmod(columns, 2 * self.bricks)
-        return np.asarray(super().load_index(own) + self._rows * part[:, :1])
-
-    def entries(self, rows: Ints) -> Ints:
-        return np.asarray(rows[:, None] * self._rows + rows % self._rows)
+        part, own = np.divmod(columns, 2 * self.maps.bricks)
+        return np.asarray(super().load_index(own) + self.flexibility.shape[1] * part[:, :1])
 
     def weight_rows(self, index: Ints) -> Ints:
-        part = index[:, 0] // self._rows
-        return np.asarray(self._rows * (part + 1) - 1)
+        rows = self.flexibility.shape[1]
+        return np.asarray(rows * (index[:, 0] // rows + 1) - 1)
 
     def answers(self, names: Sequence[str], index: Ints, force: Floats) -> dict[str, Floats]:
         loads = self.loads(index, force)
         return {name: np.asarray(loads @ self.of_loads(name)) for name in names}
 
-    def of_loads(self, name: str) -> Floats:
+    def of_loads(self, name: str, *, keep: bool = True) -> Floats:
         if name not in self._made:
-            every = np.concatenate([each._of_loads(name) for each in self.parts])
-            self._made[name] = frozen(every)
+            every = [each.of_loads(name, keep=False) for each in self.parts]
+            self._made[name] = frozen(np.concatenate(every))
         return self._made[name]
 
 

@@ -13,7 +13,7 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cached_property
 from importlib.util import find_spec
 from math import prod
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import (
+    FLAGS,
     RIGID,
     SHAPES,
     Fields,
@@ -33,7 +34,6 @@ from seqopt.engines.interface import (
     _failing_in_a_line,
     grip_columns,
     keep_wanted,
-    names_wanted,
     read_compliance,
     require_finite,
 )
@@ -51,12 +51,11 @@ from seqopt.engines.rigid._operator import (
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work._workers import one_thread
+from seqopt.work import _one_thread
 
 if TYPE_CHECKING:
     from seqopt.engines.rigid._extremes import GrownExtremes
     from seqopt.engines.rigid._frontal import FrontalSystem
-    from seqopt.engines.rigid._mixed import Shared
     from seqopt.engines.rigid._refinement import Refinement
 
 _EXTREMES = Later("seqopt.engines.rigid._extremes")  # with numba alone
@@ -72,6 +71,7 @@ _LARGE, _EACH = 150, 75  # bricks, in all and for every set, from which on block
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # largest error, as `ACCURACY`, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots bound the error
+COMPILES = find_spec("numba") is not None  # whether loops can be compiled
 
 
 class _FastSolution:
@@ -95,7 +95,8 @@ class _FastSolution:
         force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
         for start in range(0, sets, _CHUNK):
             part = slice(start, start + _CHUNK)
-            mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
+            mine = pairs.only((pairs.sets >= start) & (pairs.sets < start + _CHUNK))
+            mine = mine._replace(sets=mine.sets - start)
             own, most = compliance.select(part), accuracy / _UNSEEN
             found = grip_forces(operator, columns[part], index[part], mine, own)
             force[part] = found.force
@@ -115,14 +116,11 @@ class _FastSolution:
         """Return the fields of all sets by name."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
-        asked = names_wanted(want)
-        known = operator.answers([n for n in SHAPES if n in asked], self.index, force)
-        none, sets, found = np.empty((len(columns), 0)), len(columns), dict[str, Floats]()
+        known = operator.answers([n for n in SHAPES if want & FLAGS[n]], self.index, force)
+        none, found = np.empty((len(columns), 0)), dict[str, Floats]()
         for name, shape in SHAPES.items():
             flat = known.get(name, none)
-            found[name] = (
-                flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
-            )
+            found[name] = flat.reshape(len(flat), flat.shape[1] // prod(shape), *shape)
         share_pairs(operator, self.index, force, found["edge_force"], self.pairs)
         borne = operator.by_grip(force)
         found["grip_force"] = borne[..., :3]
@@ -180,12 +178,6 @@ def _extremes_in(fields: Fields, want: Want) -> Extremes:
 def _squared(vectors: Floats) -> Floats:
     """Return the squares of lengths (S, n) of vectors (S, n, 3), of which NumPy takes thrice."""
     return np.asarray(np.einsum("snk,snk->sn", vectors, vectors))
-
-
-@cache
-def _can_compile() -> bool:
-    """Return whether loops can be compiled: numba is there."""
-    return find_spec("numba") is not None
 
 
 class ComplianceEngine(NamedEngine):
@@ -253,7 +245,7 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self.network, columns, numbers, None)
-        if not compiled or not compliance.rigid or not _can_compile():
+        if not (compiled and compliance.rigid and COMPILES):
             fields = self._found(bricks, columns, compliance, want)
             return _extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
@@ -280,14 +272,14 @@ class ComplianceEngine(NamedEngine):
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         known = self._kept.pop(bricks, None)
-        if known is None or not known.covers(columns // 2):
+        if known is None or (known.place.take(columns // 2) < 0).any():  # it bears no loads there
             held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
             taken = sum(each.nbytes for each in self._kept.values())
             while taken > _KEPT:  # those that were not asked for longest go
                 taken -= self._kept.pop(next(iter(self._kept))).nbytes
-            with one_thread():
+            with _one_thread():
                 known = self._builder.operator(bricks, held)
         self._kept[bricks] = known
         return known
@@ -303,12 +295,6 @@ class ComplianceEngine(NamedEngine):
             even &= low >= _EVEN * np.maximum.accumulate(stiffness[order].max(axis=1))
         every = len(self.network.inner)
         return every if even.all() else int(springs.since[order][even.argmin()]) - 1
-
-    @cached_property
-    def _shared(self) -> Shared:
-        """What the systems that correct answers are cut from."""
-        found: Shared = _MIXED.share(self.network)
-        return found
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -327,11 +313,9 @@ class ComplianceEngine(NamedEngine):
         self.corrected += len(columns)
         tied = bricks <= len(self._tree.spring)  # the tree that operators grow on reaches them all
         operator = self._operator(bricks, columns) if tied else None
-        with one_thread():
+        with _one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = _REFINEMENT.Refinement(
-                    self.network, bricks, self._shared, tied=tied
-                )
+                self._refinement = _REFINEMENT.Refinement(self.network, bricks, tied=tied)
             last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
             answer = self._refinement.solve(columns, operator, last, compliance)
         return keep_wanted(answer, want)

@@ -47,7 +47,7 @@ from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import Stage, Tell, ending
+from seqopt.work import Stage, Tell, _ending
 
 TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
@@ -71,7 +71,7 @@ class Timer:
     """A clock, s, a guard that ends a block by a `TimeoutError`, and the number of repeats."""
 
     now: Callable[[], float] = time.perf_counter
-    within: Callable[[float], AbstractContextManager[None]] = ending
+    within: Callable[[float], AbstractContextManager[None]] = _ending
     times: int = TIMES
 
     def least(self, seconds: float, call: Callable[[], Found]) -> tuple[float, Found]:

@@ -19,7 +19,6 @@ react. `seqopt.stability` asks less: only that balanced forces exist.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -34,13 +33,7 @@ from seqopt.contact.mortar import quadrature_stiffness as bed_stiffness
 from seqopt.engines.interface import FAR, Fields, GripCompliance, OpeningEngine, grip_springs
 from seqopt.engines.rigid._mixed import Solution, mechanism_error, require_resistance, respond
 from seqopt.errors import SolverError
-from seqopt.network._mechanics import (
-    build_statics,
-    deformation,
-    node_motion,
-    point_motion,
-    spring_stiffness,
-)
+from seqopt.network._mechanics import deformation, node_motion, point_motion, spring_stiffness
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
@@ -112,6 +105,7 @@ class _System(FrozenValue):
     acting: Ints  # (J,); the springs whose joints these are
     points: _Points
     face: Ints  # (P,); the joint of every point, in ascending order
+    first: Ints  # (J,); the first point of every joint
     maps: Floats  # (P, 3, 6); openings for unit twists across a joint, taken at its spring
     gap: sparse.csr_array  # (6J, 6n); twists across the beds for unit twists of the n bodies
     layers: sparse.csr_array  # (6n, 6n); stiffness of the elastic layers
@@ -119,27 +113,19 @@ class _System(FrozenValue):
     moved: Floats  # (6J,); how the ground moves where beds lie on it
     unit: Floats  # (6n,)
     length: float  # of a brick, m
+    scale: float  # the heaviest body's weight, N
 
     def bed_wrenches(self, force: Floats) -> Floats:
         """Return the wrenches (J, 6) of point forces (P, 3) on second bodies, about the springs."""
         each = np.einsum("pij,pi->pj", self.maps, force)
-        return np.asarray(np.add.reduceat(each, self._starts, axis=0))
+        return np.asarray(np.add.reduceat(each, self.first, axis=0))
 
     def beds(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness (6J, 6J) of the beds for twists across; slopes as of `_Points`."""
         falls = (slope @ self.maps).reshape(-1, 6)
-        maps, ends = self.maps.reshape(-1, 6), [*3 * self._starts, None]
+        maps, ends = self.maps.reshape(-1, 6), [*3 * self.first, None]
         parts = [slice(*part) for part in pairwise(ends)]
         return _diagonal(np.array([maps[part].T @ falls[part] for part in parts]))
-
-    @cached_property
-    def scale(self) -> float:
-        """The heaviest body's weight, N."""
-        return float(np.abs(self.load).max()) or 1.0
-
-    @property
-    def _starts(self) -> Ints:
-        return np.searchsorted(self.face, np.arange(len(self.acting)))
 
 
 def _build_system(
@@ -175,7 +161,21 @@ def _build_system(
     normal, tangential = (area * moduli[face, i] for i in (0, 1))
     points = _Points(area, normal, tangential, mortar, assembly.stress_scale)
     pull = load.ravel() * unit
-    return _System(bricks, acting, points, face, maps, gap, layers, pull, moved, unit, length)
+    return _System(
+        bricks=bricks,
+        acting=acting,
+        points=points,
+        face=face,
+        first=np.searchsorted(face, np.arange(len(acting))),
+        maps=maps,
+        gap=gap,
+        layers=layers,
+        load=pull,
+        moved=moved,
+        unit=unit,
+        length=length,
+        scale=float(np.abs(pull).max()) or 1.0,
+    )
 
 
 def _joined(
@@ -223,10 +223,10 @@ class _Held:
         pull: Floats,
     ) -> None:
         self.system, self.free, self.pads, self.far, self.pull = system, free, pads, far, pull
-        self._across = sparse.csr_array(system.gap @ free)  # twists across the beds, (6J, m)
-        self._taken, stiff = system.gap @ far, system.layers + pads
+        self.across = sparse.csr_array(system.gap @ free)  # twists across the beds, (6J, m)
+        self.taken, stiff = system.gap @ far, system.layers + pads
         self._unbroken = sparse.csr_array(free.T @ stiff @ free)  # but for beds, (m, m)
-        self._sizes = sparse.csr_array(abs(system.layers) + abs(pads))
+        self.sizes = sparse.csr_array(abs(system.layers) + abs(pads))
         none = np.zeros((len(system.points.area), 3))
         _, slope = system.points.forces(none, none[:, 1:], np.zeros(len(none), bool))
         self.diagonal = self.stiffness(slope).diagonal()
@@ -246,25 +246,14 @@ class _Held:
         given = share * (system.load + self.pull)
         return np.asarray(given + carried - (system.layers + self.pads) @ moved)
 
-    def openings(self, motion: Floats, share: float) -> Floats:
-        """Return the openings (P, 3) of the points; as of `reaction`."""
-        system, across = self.system, self._across @ motion + share * self._taken
-        across = (across - share * system.moved).reshape(-1, 6)
-        return np.asarray(np.einsum("pij,pj->pi", system.maps, across[system.face]))
-
-    def rounding(self, motion: Floats, force: Floats) -> float:
-        """Return the rounding error of a balance between large forces, N."""
-        moved = np.abs(self.moved(motion))
-        return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
-
     def gone(self, state: _Settled) -> bool:
         """Return whether a state has moved too far for the bricks to be where they were."""
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness (m, m) in the free motions; slopes as of `_Points.forces`."""
-        across = self._across
-        return sparse.csr_array(across.T @ self.system.beds(slope) @ across + self._unbroken)
+        beds = self.across.T @ self.system.beds(slope) @ self.across
+        return sparse.csr_array(beds + self._unbroken)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -282,13 +271,6 @@ class _Settled(FrozenValue):
     broken: Bools
     left: float
 
-    @classmethod
-    def start(cls, held: _Held, *, broken: bool) -> _Settled:
-        """Return the state without load. ``broken``: whether all bonds are lost at once."""
-        none = np.zeros((len(held.system.points.area), 3))
-        motion = np.zeros(held.free.shape[1])
-        return cls(motion, none, none[:, 1:], np.full(len(none), broken), np.inf)
-
     @property
     def rests(self) -> bool:
         """Whether this is an equilibrium."""
@@ -304,10 +286,12 @@ def _settle(held: _Held) -> _Settled:
     """
     points = held.system.points
     dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0
-    state = _balance(held, _Settled.start(held, broken=dry), 1.0)
+    none, motion = np.zeros((len(points.area), 3)), np.zeros(held.free.shape[1])
+    unloaded = _Settled(motion, none, none[:, 1:], np.full(len(none), dry), np.inf)
+    state = _balance(held, unloaded, 1.0)
     if dry or (state.rests and not points.exceeds(state.force).any()):
         return state
-    state, at, step = _Settled.start(held, broken=False), 0.0, LARGEST_STEP
+    state, at, step = unloaded, 0.0, LARGEST_STEP
     while at < 1.0:
         target = min(at + step, 1.0)
         found = _balance(held, state, target)
@@ -350,12 +334,14 @@ def _newton(held: _Held, state: _Settled, share: float, resistance: float) -> _S
     drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
     for _ in range(_ITERATIONS):
-        opening = held.openings(motion, share)
+        across = held.across @ motion + share * held.taken - share * system.moved
+        opening = np.einsum("pij,pj->pi", system.maps, across.reshape(-1, 6)[system.face])
         force, slope = system.points.forces(opening, state.slip, state.broken)
         left = held.free.T @ held.reaction(motion, force, share)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
-        rounding = min(held.rounding(motion, force), _HIDDEN * system.scale)
+        large = (held.sizes @ np.abs(held.moved(motion))).max() + np.abs(force).sum()
+        rounding = min(_ROUNDING * float(large), _HIDDEN * system.scale)
         unit = max(system.scale, rounding / _BALANCED)
         if np.abs(missing).max() <= _BALANCED * unit:
             slip = opening[:, 1:] + force[:, 1:] / system.points.tangential[:, None]
@@ -437,7 +423,7 @@ def _held_nodes(
     count = len(system.load) // 6
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
-    rigid, far = ~compliance.compliant(1, len(columns))[0], compliance.offsets(1, len(columns))[0]
+    rigid, far = ~compliance.compliant(1, len(columns))[0], compliance.offsets(len(columns))
     nodes = network.node_position[network.inner.ravel()[columns]]
     for body in np.unique(columns[rigid] // 2):
         mine = rigid & (columns // 2 == body)
@@ -481,5 +467,4 @@ def _fields(
             force[mine] = pulls.reshape(-1, 3)
     twist = (system.unit * moved)[None, : 6 * system.bricks]
     solution = Solution(twist, wrench[None], force[None], moment[None], compliant[None])
-    motion, statics = node_motion(network, system.bricks), build_statics(network)
-    return respond(network, statics, motion, columns[None], solution)
+    return respond(network, node_motion(network, system.bricks), columns[None], solution)
