@@ -6,7 +6,7 @@ A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
 :math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, over weights from 0 up to the largest of one
 that add up to one. At fixed weights the cheapest path is what a formulation finds for a single sum,
 and a bound on all. What the best weights leave open is closed by labels, vectors of totals
-(`seqopt.graph._labels`): with the least from every state on, under each of some weights, a label
+(`seqopt.graph._budgets`): with the least from every state on, under each of some weights, a label
 has a bound.
 """
 

@@ -27,7 +27,7 @@ Its height is a bound on what any path within the budgets costs, the same as tha
 program, and the multipliers are its duals. The path is the cheapest within the budgets among those
 met; it need not be the best. ``labels`` goes on: a label is a beginning of a path, with what it
 costs and takes; those are continued that may become better than the best path known
-(`seqopt.graph._labels`). Without budgets both are the optimum.
+(`seqopt.graph._budgets`). Without budgets both are the optimum.
 """
 
 from __future__ import annotations

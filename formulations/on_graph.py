@@ -33,8 +33,16 @@ from formulations._search import (
 )
 from seqopt.arrays import Floats, Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, within_budgets
-from seqopt.graph._labels import Joint, LabelSearch, Sums, widening
+from seqopt.graph._budgets import (
+    Joint,
+    LabelSearch,
+    Plane,
+    Polyhedron,
+    Sums,
+    highest_bound,
+    widening,
+    within_budgets,
+)
 from seqopt.graph._spaces import build_space, explore
 from seqopt.graph.formulation import Formulation, FormulationKind, Solution, Watch, formulations
 from seqopt.graph.graph import (

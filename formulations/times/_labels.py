@@ -1,7 +1,7 @@
 """Labels over a build in time, in batches, and multipliers of the robots' time, which bound them.
 
 A label of a state is when the last step ended, since when the robots of its columns are free, what
-sums took by then, and what further resources came to (`seqopt.graph._labels`).
+sums took by then, and what further resources came to (`seqopt.graph._budgets`).
 
 Every build takes at least the time of all that its steps take one after the
 other, and no less than the time of any robot: preparing, acting, and holding while others act. With
@@ -16,8 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph._budgets import Plane, Polyhedron, highest_bound
-from seqopt.graph._labels import Asked, Carried, Joint, Sums, Sweep, Swept
+from seqopt.graph._budgets import (
+    Asked,
+    Carried,
+    Joint,
+    Plane,
+    Polyhedron,
+    Sums,
+    Sweep,
+    Swept,
+    highest_bound,
+)
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph, distances, fewest_moves, moves_along
 from seqopt.problem.requirements import Resource, StepArrays

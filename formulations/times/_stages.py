@@ -16,7 +16,7 @@ from formulations._search import StopError
 from formulations.times._labels import Caps, Carrying, Prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
-from seqopt.graph._labels import Labels, LateError, Swept
+from seqopt.graph._budgets import Labels, LateError, Swept
 from seqopt.graph.formulation import LabelProof, Watch
 from seqopt.graph.graph import _best_moves, _on_paths, moves_along, tied
 from seqopt.graph.space import Visited

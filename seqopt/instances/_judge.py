@@ -12,16 +12,8 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import PEAK, TAIL, TIME, _Target, _target_sums, tied
 from seqopt.instances.model import Instance
-from seqopt.judge.arithmetic import (
-    ABOVE,
-    Labelled,
-    Stage,
-    _peak_bound,
-    _sum_bound,
-    least_within,
-    limit_below,
-)
-from seqopt.judge.certificate import TOLERANCE, Certificate, _path_twin
+from seqopt.judge.arithmetic import ABOVE, Labelled, Stage, _peak_bound, _sum_bound, least_within
+from seqopt.judge.certificate import TOLERANCE, Certificate, _path_twin, limit_below
 
 
 @dataclass(frozen=True, eq=False, repr=False)

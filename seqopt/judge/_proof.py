@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import LabelProof, Solution
@@ -35,16 +36,7 @@ from seqopt.graph.graph import (
 from seqopt.graph.states import States
 from seqopt.judge._rule_moves import RuleTables, Transitions, may_follow
 from seqopt.judge._states import Filter, Reachable, StateEvaluator, places
-from seqopt.judge.arithmetic import (
-    Book,
-    Closed,
-    Stage,
-    TwinBook,
-    budget_bounds,
-    is_beyond,
-    limit_below,
-)
-from seqopt.judge.certificate import _twin_of
+from seqopt.judge.certificate import _twin_of, limit_below
 from seqopt.network.network import build_network
 from seqopt.problem.amounts import NONE
 from seqopt.problem.problem import Orders
@@ -52,6 +44,10 @@ from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence.rules import _RuleBook
 
+if TYPE_CHECKING:
+    from seqopt.judge.arithmetic import Book, Stage
+
+ARITHMETIC = Later("seqopt.judge.arithmetic")  # of budgets and labels
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
 
@@ -345,7 +341,9 @@ class Proof:
         stand = margins if self.evaluator.demands(margins) else None
         rebuilt = self.rebuilt(Filter(values, stand))
         self.states = sum(map(len, rebuilt.states))
-        return budget_bounds(rebuilt.graph(), values, claimed, (caps, multipliers))
+        asked = rebuilt.graph(), values, claimed, (caps, multipliers)
+        out: tuple[float, ...] = ARITHMETIC.budget_bounds(*asked)
+        return out
 
     def label_bounds(self, values: Sequence[float], found: Solution) -> tuple[float, ...]:
         """Return bounds of plans with resources, by labels that are claimed.
@@ -372,7 +370,7 @@ class Proof:
         if not caps:
             return not graph.ends[reached(graph)].any()
         first = len(graph.peaks) - len(caps)
-        return is_beyond(graph, [*enumerate(caps, start=first)])
+        return bool(ARITHMETIC.is_beyond(graph, [*enumerate(caps, start=first)]))
 
     def _falls_everywhere(self, margins: Sequence[float]) -> bool:
         """Return whether states that are proven to fall, or to lack margins, leave no path.
@@ -440,7 +438,7 @@ class _LabelBounds:
         problem, values = self._evaluator.problem, self._values
         kinds = [TIME if g.in_time else PEAK if g.is_peak else SUM for g in problem.goals]
         goals = [_Target(problem.names[k], kind, (k,)) for k, kind in enumerate(kinds)]
-        aims, stage = len(problem.aims), Stage(graph)
+        aims, stage = len(problem.aims), ARITHMETIC.Stage(graph)
         for goal, cap in zip(goals[aims:], problem.budgets, strict=True):
             stage = stage.after(goal, cap)
         cures = self._timed is not None and self._timed.cures
@@ -476,7 +474,7 @@ class _LabelBounds:
             clock, move = self._timed.clock(graph, prices, most, strict=of_time)
             books, least = [clock], min(clock.bound, claimed) if of_time else least
         books += below.books(goal, claimed, move)
-        closed = Closed(graph, move, [*books, *self._twins(graph, move)])
+        closed = ARITHMETIC.Closed(graph, move, [*books, *self._twins(graph, move)])
         margins = self._values[: self._evaluator.margins]
 
         def fallen(states: Ints) -> Bools:
@@ -500,7 +498,8 @@ class _LabelBounds:
         source, target = graph.source[move], graph.target[move]
         stands = bricks[self._rebuilt.part_of()[target]]
         steps = StepArrays(stands, nodes[source], nodes[target])
-        return [TwinBook(each.twin, steps) for each in problem.paths if each.twin is not None]
+        twins = (each.twin for each in problem.paths if each.twin is not None)
+        return [ARITHMETIC.TwinBook(twin, steps) for twin in twins]
 
     def _labels(self, proof: LabelProof, width: int) -> tuple[Ints, Floats]:
         """Return labels (N, width) by the numbers of their states, as far as there are such.

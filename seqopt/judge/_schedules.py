@@ -28,8 +28,15 @@ from seqopt.graph.states import States
 from seqopt.judge._proof import Hint, Proof, TooManyPartsError
 from seqopt.judge._rule_moves import check_free, may_follow
 from seqopt.judge._states import StateEvaluator, depends_on_robots, largest_load, props_that_hold
-from seqopt.judge.arithmetic import limit_below
-from seqopt.judge.certificate import TOLERANCE, Basis, Certificate, _own_values, _twin_of, exceeds
+from seqopt.judge.certificate import (
+    TOLERANCE,
+    Basis,
+    Certificate,
+    _own_values,
+    _twin_of,
+    exceeds,
+    limit_below,
+)
 from seqopt.problem.amounts import LARGEST, NONE, Amount, MoveArrays, StateArrays
 from seqopt.problem.requirements import LINEAR_RANGE, Limit, StepArrays, _first_fault
 from seqopt.responses._grip_sets import Moved

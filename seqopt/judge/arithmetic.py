@@ -11,7 +11,7 @@ checked here:
 - *Labels* of partial paths close what multipliers leave open. They say of some states what paths to
   them have come to in all resources. No path is better if every successor of one of them is
   dominated by another one, or cannot end better: that is computed again, by the judge's own books
-  of resources. A sweep (`seqopt.graph._labels`) finds them, or a formulation; if there are too
+  of resources. A sweep (`seqopt.graph._budgets`) finds them, or a formulation; if there are too
   many, the least bound of those left out holds for all.
 """
 
@@ -27,8 +27,16 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._budgets import Plane, Polyhedron, _cheapest, highest_bound
-from seqopt.graph._labels import CappedSums, Joint, Sweep, Swept
+from seqopt.graph._budgets import (
+    CappedSums,
+    Joint,
+    Plane,
+    Polyhedron,
+    Sweep,
+    Swept,
+    _cheapest,
+    highest_bound,
+)
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import (
     PEAK,
@@ -45,9 +53,9 @@ from seqopt.graph.graph import (
     strictly_below,
     tied,
 )
+from seqopt.judge.certificate import limit_below
 from seqopt.problem.requirements import Resource, StepArrays
 
-BETTER = 1e-9  # over a value: a path must be better by more than this
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
 MIXTURES = 80  # multipliers that are tried
 DEAREST = 1e7  # largest multiplier, over what a path costs per unit of a cap
@@ -104,11 +112,6 @@ class Stage(NamedTuple):
             return []
         columns, most, strict = (np.array(each) for each in zip(*limited, strict=True))
         return [SumBook(self.graph, move, self.graph.amounts[:, columns], (most, strict))]
-
-
-def limit_below(value: float) -> float:
-    """Return the least that is no better than a value."""
-    return value - BETTER * abs(value)
 
 
 def budget_bounds(

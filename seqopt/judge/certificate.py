@@ -26,11 +26,17 @@ from seqopt.responses._tolerance import is_tolerance
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 ROUNDED = 1e-9  # by which a response may be over a limit, over its size
+BETTER = 1e-9  # over a value: a path must be better by more than this
 
 
 def _known_gap(gap: float) -> float:
     """Return a gap, or zero if it is within the tolerance of proofs."""
     return 0.0 if gap <= TOLERANCE else gap
+
+
+def limit_below(value: float) -> float:
+    """Return the least that is no better than a value."""
+    return value - BETTER * abs(value)
 
 
 class Basis(StrEnum):

@@ -18,7 +18,7 @@ extends it,
 Of two labels of one state the first *dominates* the other one if every extension of that one is
 feasible for it: by default where none of its values is larger, so :math:`f` must not fall in
 :math:`z`. When robots are free, how old mortar is and sums within budgets are carried by labels in
-the same way (`seqopt.graph._labels`). Further filters and resources are registered
+the same way (`seqopt.graph._budgets`). Further filters and resources are registered
 (`seqopt.register`) and named as limits.
 """
 

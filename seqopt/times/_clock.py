@@ -14,7 +14,8 @@ from seqopt.errors import SolverError
 from seqopt.graph.graph import TIME, Graph, _Target, _to_go
 from seqopt.judge._proof import Rebuilt
 from seqopt.judge._states import StateEvaluator
-from seqopt.judge.arithmetic import Book, Closed, Stage, _is_beyond_limits, _sum_bound, limit_below
+from seqopt.judge.arithmetic import Book, Closed, Stage, _is_beyond_limits, _sum_bound
+from seqopt.judge.certificate import limit_below
 from seqopt.network.network import Network
 from seqopt.stability.standing import Standing
 from seqopt.times._curing import CuringStates, FallCuts, JointsInTime

@@ -9,7 +9,7 @@ import numpy as np
 from seqopt.contact.assembly import step_assembly
 from seqopt.errors import SolverError
 from seqopt.graph.states import States
-from seqopt.judge.arithmetic import BETTER
+from seqopt.judge.certificate import BETTER
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Site, Step, StepKind

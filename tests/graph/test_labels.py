@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from experiments.harness.layers import best_in_order
 from formulations.on_graph import _Totals
 from seqopt.graph import Graph
-from seqopt.graph._labels import CappedSums, Joint, LabelSearch, LateError, Sweep, widening
+from seqopt.graph._budgets import CappedSums, Joint, LabelSearch, LateError, Sweep, widening
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import FAILS, PASSES, _lazy_path
 from seqopt.plan._answers import _branches
