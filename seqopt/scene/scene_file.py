@@ -30,7 +30,8 @@ from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
-BOXES = Later("seqopt.scene.boxes")  # where a file is checked
+BOXES, networkx = Later("seqopt.scene.boxes"), Later("networkx")  # where a file is checked
+_CORNERS = 0.2  # of the thinner brick: how far corners of arches may run into each other
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
@@ -53,6 +54,16 @@ def _find_warnings(scene: Scene) -> Iterator[str]:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             yield f"brick {found[0].name}{more}: {said.format(found[0])}"
     yield from _find_overlapping(scene)
+    ties = networkx.Graph(
+        [joint.bricks for joint in scene.joints if any(joint.translational_stiffness)]
+    )
+    ties.add_edges_from(
+        ("ground", end.brick) for end in scene.grounds if any(end.translational_stiffness)
+    )
+    tied = networkx.node_connected_component(ties, "ground") if "ground" in ties else ()
+    if free := [brick.name for brick in scene.bricks if brick.name not in tied]:
+        more_of_them = f" and {len(free) - 1} more" if len(free) > 1 else ""
+        yield f"brick {free[0]}{more_of_them}: no joint leads from it to the ground; tie it"
     bricks = {brick.name: brick for brick in scene.bricks}
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
@@ -73,18 +84,18 @@ def warn_of(scene: Scene, name: str) -> None:
 def _find_overlapping(scene: Scene) -> Iterator[str]:
     """Yield a line on each pair of bricks that interpenetrate by more than `TOLERATED`.
 
-    A joint without a face is checked with its bricks in `seqopt.contact.assembly`: those of arches
-    may run into each other at their corners. Beams do by intent: bricks with a shape and such
-    joints.
+    Bricks of arches may run into each other at their corners, across a joint without a face: more
+    than `_CORNERS` is no corner. Beams do by intent: bricks with a shape and such joints.
     """
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     faceless = [spring.ends for spring in springs if spring.face is None]
     checked, beams = {*map(frozenset, faceless)}, {end for ends in faceless for end in ends}
     solid = [b for b in scene.bricks if b.shape is None or b.name not in beams]
+    thin = {brick.name: min(brick.dimensions) for brick in solid}
     lines = [
         f"bricks {a} and {b} interpenetrate by {1e3 * depth:.3g} mm; move them apart"
         for a, b, depth in BOXES.overlapping(solid)
-        if frozenset((a, b)) not in checked
+        if frozenset((a, b)) not in checked or depth > _CORNERS * min(thin[a], thin[b])
     ]
     yield from lines[:_SHOWN]
     if len(lines) > _SHOWN:

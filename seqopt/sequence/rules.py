@@ -19,7 +19,7 @@ from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
 from seqopt.scene.scene import Scene, _reachable
 from seqopt.sequence.methods import placing_node
-from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, near_rule
+from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, islands, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
@@ -363,6 +363,22 @@ def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules
             value = tuple(part.strip() for part in text.split(","))
         found = replace(found, **{name: loosest.get((name, text), value)})  # type: ignore[arg-type]
     return found
+
+
+def require_buildable(network: Network, rules: FreeRules) -> None:
+    """Raise a `StepError` without robots, or where a brick hangs free once they have let go."""
+    scene, last = network.scene, rules.span(network.scene)[1]
+    if not scene.robots:
+        raise StepError(f"scene {scene.name}: it has no robots; give at least one")
+    if rules.takes_down or rules.how_it_ends is Ending.HELD:
+        return
+    for island in islands(network, last)[:1]:
+        names = ", ".join(map(str, sorted(island)))
+        hang = f"bricks {names} hang" if len(island) > 1 else f"brick {names} hangs"
+        raise StepError(
+            f"scene {scene.name}: {hang} free: no joint leads to the ground; tie it, or let robots "
+            "hold on at the end (--rule ending=held)"
+        )
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
