@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -67,6 +67,7 @@ class Mortar:
 
 
 _FRICTION = math.tan(math.radians(25.0))
+_ROUGHEST = 2.0  # more is an angle that was meant
 DRY = Mortar(friction=_FRICTION)
 """Blocks laid dry: compression and friction alone.
 
@@ -94,6 +95,19 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     slides, pulled = mortar.friction - other.friction, other.tensile_strength
     rough = slides == 0 or (slides > 0 and not pulled)
     return rough and mortar.tensile_strength >= pulled and mortar.cohesion >= other.cohesion
+
+
+def with_friction(mortar: Mortar, friction: float | None) -> Mortar:
+    """Return a mortar with another coefficient of friction, if one is given.
+
+    A `SceneError` says of more than `_ROUGHEST` what an angle of as many degrees is.
+    """
+    if friction is None:
+        return mortar
+    if friction > _ROUGHEST:
+        slope = f"; {friction:g}° is {math.tan(math.radians(friction)):.3g}" * (friction < 90)
+        raise SceneError(f"friction {friction:g}: give a coefficient up to {_ROUGHEST:g}{slope}")
+    return replace(mortar, friction=friction)
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:

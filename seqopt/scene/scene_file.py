@@ -36,11 +36,12 @@ _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
 _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
+_FAR_REACH = 100.0  # m; of a robot
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
-def _find_warnings(scene: Scene) -> Iterator[str]:
-    """Yield warnings about a scene, one line each; most scenes have none."""
+def _find_odd_units(scene: Scene) -> Iterator[str]:
+    """Yield a line on gravity, lengths and densities that seem to be in other units."""
     pull = math.hypot(*scene.gravity)
     if pull > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
@@ -53,6 +54,17 @@ def _find_warnings(scene: Scene) -> Iterator[str]:
         if found:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             yield f"brick {found[0].name}{more}: {said.format(found[0])}"
+    far = [r for r in scene.robots if isinstance(r.reach, Sphere) and r.reach.radius > _FAR_REACH]
+    for robot in far[:1]:
+        yield f"{robot.name}: a reach of {robot.reach.radius:g} m looks like millimeters"  # type: ignore[union-attr]
+    moved = [end for end in scene.grounds if end.movement and max(map(abs, end.movement)) > 1]
+    for end in moved[:1]:
+        yield f"{end.label}: a movement of {max(map(abs, end.movement or ())):g} is m or rad"
+
+
+def _find_warnings(scene: Scene) -> Iterator[str]:
+    """Yield warnings about a scene, one line each; most scenes have none."""
+    yield from _find_odd_units(scene)
     yield from _find_overlapping(scene)
     ties = networkx.Graph(
         [joint.bricks for joint in scene.joints if any(joint.translational_stiffness)]
@@ -75,9 +87,12 @@ def _find_warnings(scene: Scene) -> Iterator[str]:
             yield f"{label}: it lies {away:.4g} m from brick {end}"
 
 
-def warn_of(scene: Scene, name: str) -> None:
-    """Give a `SceneWarning` for each thing that looks wrong in a scene."""
-    for doubt in _find_warnings(scene):
+def warn_of(scene: Scene, name: str, *, made: bool = False) -> None:
+    """Give a `SceneWarning` for each thing that looks wrong in a scene.
+
+    ``made``: whether it was made of words, so that only its units can be wrong.
+    """
+    for doubt in _find_odd_units(scene) if made else _find_warnings(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
@@ -209,9 +224,11 @@ def load_scene(name: str | Path) -> Scene:
         return _parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
     kind, colon, _ = name.partition(":")
     if colon and kind in KINDS:
-        return _scene_by_words(name)
+        scene = _scene_by_words(name)
+        warn_of(scene, name, made=True)
+        return scene
     path = Path(name)
-    if not path.suffix and not os.path.lexists(path):
+    if (not path.suffix or "=" in name) and not os.path.lexists(path):
         hint = did_you_mean(kind, KINDS) if colon else did_you_mean(name, builtin_scenes())
         raise SceneError(
             f"scene {name}: no such built-in scene or file{hint}; "
