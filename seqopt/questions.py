@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import dist, inf
@@ -38,7 +38,7 @@ from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.steps import Site, Step
+from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
 from seqopt.stability.standing import Standing
@@ -392,7 +392,8 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
             found = optimize(with_robots(built, count), part, robots=count, **every)
             said = f"; or with one more robot that reaches every node: {found.result}"
         raise InfeasibleError(f"{error}{said}") from None
-    changes = REPLAN.compared(new, [step for step in steps if step.number > at])
+    rest = [step for step in steps if step.number > at]
+    changes = REPLAN.compared(new, rest, next(_gone(scene, new, rest, lost), ""))
     if measured is not None:
         planned = {brick.name: brick.position for brick in scene.bricks}
         bricks = new.engine.network.scene.bricks
@@ -400,6 +401,18 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
         left = float(new.tolerances()["tolerance_mm"].min() / 1000)
         changes |= {"off_m": off, "off_brick": brick, "tolerance_left_m": left}
     return replace(new, changes=changes)
+
+
+def _gone(scene: Scene, new: Plan, rest: Sequence[Step], lost: Sequence[str]) -> Iterator[str]:
+    """Yield which robot that is lost, or brick that is missing, steps of the old plan need."""
+    there = new.engine.network.scene.build_order
+    for step in rest:
+        holds = zip(scene.robots, step.grips, strict=False)
+        for name in (r.name for r, node in holds if node is not None and r.name in lost):
+            yield f"step {step.number}: {name} is lost"
+        if step.kind is StepKind.PLACE and there[: step.bricks] != scene.build_order[: step.bricks]:
+            late = next(b for b in scene.build_order if b != there[scene.build_order.index(b)])
+            yield f"step {step.number}: brick {late} is missing, and comes later"
 
 
 def _planned(

@@ -39,13 +39,13 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
     return {name: goal.shown(value) for goal, name, value in pairs}
 
 
-def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
+def compared(plan: Plan, old: Sequence[Step], broken: str = "") -> dict[str, object]:
     """Return the changes of a new plan: values of the old rest, and the first step that differs.
 
-    ``old``: the steps that were planned from where the new plan begins. Result: ``as_planned``,
-    what goals take of them now, or ``broken``, why they cannot go on; ``differs``, the number of
-    the first step that is another, None if all are the same; ``steps``, how many there are now, and
-    ``steps_before``.
+    ``old``: the steps that were planned from where the new plan begins; ``broken``: why they cannot
+    go on, if that is known. Result: ``as_planned``, what goals take of them now, or ``broken``;
+    ``differs``, the number of the first step that is another, None if all are the same; ``steps``,
+    how many there are now, and ``steps_before``.
     """
     robots = len(plan.states.network.scene.robots)
     old = [replace(s, grips=(*s.grips, *[None] * (robots - len(s.grips)))) for s in old]
@@ -53,9 +53,9 @@ def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:
     first = next((new.number for new, was in pairs if new != was), None)
     if first is None and len(plan.steps) != len(old):
         first = plan.steps[0].number + min(len(plan.steps), len(old))
-    out: dict[str, object] = {"as_planned": None, "broken": ""}
+    out: dict[str, object] = {"as_planned": None, "broken": broken}
     try:
-        out["as_planned"] = goes_on(plan.states, old)
+        out["as_planned"] = None if broken else goes_on(plan.states, old)
     except SeqoptError as error:
         out["broken"] = str(error)
     return out | {"differs": first, "steps": len(plan.steps), "steps_before": len(old)}
