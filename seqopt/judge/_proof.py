@@ -464,7 +464,7 @@ class _LabelBounds:
         if not np.isfinite(claimed):
             return -np.inf
         below = stage.below(goal, claimed)
-        graph, books, least = below.graph, list[Book](), -np.inf
+        graph, least, books = below.graph, -np.inf, []
         move = np.arange(len(graph.source))
         if self._timed is not None:
             if proof.prices.ndim != 2 or proof.prices.shape[1] != 1 + len(self._columns):
