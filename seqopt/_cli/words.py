@@ -147,7 +147,8 @@ def demanded(
     names = [name for name, value in said.items() if value not in (None, ())]
     if stands is None:
         if names:
-            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
+            with_ = "epoxy" if names[0] == "curing" else "dry"
+            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {with_}, say")
         return None
     mortar = with_friction(find_mortar(stands, "stands"), friction)
     if tilt is not None and not tilt < 90:

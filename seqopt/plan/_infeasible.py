@@ -190,7 +190,8 @@ def _why_impossible(problem: States, look: Look) -> str:
         if found:
             helps = f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
         elif finished:  # nobody holds it
-            helps = "; no robot helps: it needs more bond or friction, less load, or other limits"
+            most = "more bond or friction" if problem.demands else "stiffer joints"
+            helps = f"; no robot helps: it needs {most}, less load, or other limits"
         return f"{problem.title}: {where}{helps}"
     except LateError:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
@@ -271,8 +272,10 @@ def _pairs(problem: States, look: Look, *, arms: bool) -> Iterator[str]:
     """Yield a rule with another relaxation that are enough together; ``arms``: these too."""
     rules = next(each for each in problem.every_filter if each.name == "rules")
     for text, relaxed in rules.ways(problem):
-        for name, other, _ in _ways(relaxed, look, finished=False):
-            if arms or name != "arms":
+        for name, other, both in _ways(relaxed, look, finished=False):
+            if other == IGNORED:
+                yield f"{text} (--rule {text}) together with a {_payload(relaxed, look, both)}"
+            elif (arms or name != "arms") and not (text == IGNORED and name == "rules"):
                 how = f" (--rule {text} --rule {other})" if name == "rules" else ""
                 yield f"{text} together with {other}{how}"
 
