@@ -270,6 +270,33 @@ def _carrying_excesses(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Excess, 
     return tuple(out)
 
 
+class PayloadUse(NamedTuple):
+    """What a robot holds or carries in a step, over its payload."""
+
+    share: float
+    robot: str  # its name
+    step: int  # number
+    brick: int | None = None  # the one that it carries, placing or removing it; None if it holds
+
+
+def payload_uses(scene: Scene, table: _Columns) -> list[PayloadUse]:
+    """Return the share of its payload that every robot uses, by grips, then by bricks it carries.
+
+    ``table``: of `seqopt.analyze`.
+    """
+    out, numbers = [], np.asarray(table["step"], dtype=int).tolist()
+    for robot in scene.robots:
+        forces = _response_along(scene, table, robot_response(robot.name))
+        shares = np.nan_to_num(forces / robot.payload).tolist()
+        out += [PayloadUse(s, robot.name, n) for s, n in zip(shares, numbers, strict=True)]
+    every = [(robot, loads(scene, robot)) for robot in scene.robots]
+    for number, r, brick in carried(scene, _steps_in_table(scene, table)):
+        robot, load = every[r]
+        share = float(load[scene.since[brick] - 1]) / robot.payload
+        out.append(PayloadUse(share, robot.name, number, brick))
+    return out
+
+
 def _prop_faults(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     """Return in which steps props bear more than they may; see `_excesses`."""
     return _excesses(scene, table, _prop_limits(scene))
