@@ -14,7 +14,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks, small_arch
 from tests.commands import command
 
-VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential --mortar dry"
+VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential"
 FREE = "optimize ARCH --schedule free"
 ROBUST = "optimize SIX --robust"
 WALL = "wall:columns=2,courses=2"
@@ -105,11 +105,16 @@ BAD = {
         f"compare arch25 --speed={word}": f"--speed: '{word}' is not a positive number"
         for word in ("x", "-1", WALL)
     },
-    f"{VLR} --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or some of",
+    f"{VLR} --mortar dry --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or",
     f"{VLR} --map wind": "--map wind: give friction or tilt, with values as",
     f"{VLR} --map tilt=60": "--map tilt=60: 60 is too much; give tilt from 0 to 45",
     f"{VLR} --map friction=x": "--map friction=x: 'x' is not a positive number or zero",
     f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
+    f"{VLR} --map friction --margins bond": "--margins: not allowed with --map; leave one",
+    f"{VLR} --map friction --friction 0.3": "of them out, or give --map friction=0.3",
+    f"{VLR} --map friction --mortar dry": "--mortar: not allowed with --map; leave one of them",
+    f"{VLR} --map friction --workers 2": "--workers: not allowed with --map; leave one of them",
+    f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }
 NO_ANSWER = {
     f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
