@@ -224,7 +224,7 @@ class Signature:
         text = self._spoken(text).removesuffix(".")
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
-        names = option.choices if option.name in VALUES else option.more.get("names", tuple)()
+        names = option.more.get("names", lambda: option.choices if option.name in VALUES else ())()
         text += f"; names: {', '.join(names)}" if names else ""
         return text.replace("%", "%%")
 
