@@ -256,8 +256,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         found too.
     limits : sequence of Limit, Filter or str
         What no step may exceed: payload (of every robot), or RESPONSE=VALUE in SI units, as
-        F_largest=300; also where no grip is open. Plans keep the linear range wherever one does:
-        linear_range=any lifts that, 0.5 asks for half of it in every step.
+        F_largest=300, of lengths with their unit too, as D_max=20um; also where no grip is open.
+        Plans keep the linear range wherever one does: linear_range=any lifts that, 0.5 asks for
+        half of it in every step.
     budgets : sequence of str
         Cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
         overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,

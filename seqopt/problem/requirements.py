@@ -592,8 +592,8 @@ def parse_limits(
 ) -> tuple[Asked, ...]:
     """Return limits, filters and resources that are given as such, or in words.
 
-    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
-    ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
+    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units or a length as
+    ``20um``, ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
     ``where``: for messages.
     """
     several = (given,) if isinstance(given, str | Asked) else given
@@ -610,7 +610,14 @@ def parse_limits(
         elif "=" not in each and each in (own := registered(Filter) | registered(Resource)):
             out.append(own[each])
         else:
-            out.append(_limit_of(each, where))
+            out.append(limit := _limit_of(each, where))
+            size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
+            size += max(max(brick.dimensions) for brick in scene.bricks)
+            if limit.response[0] == "D" and limit.bound > size:
+                raise ProblemError(
+                    f"{where} {each}: {limit.bound:g} m is more than the structure's size, "
+                    f"{length_text(float(size))}; give a length in m, or as 20um or 0.02mm"
+                )
     return tuple(out)
 
 
@@ -631,7 +638,7 @@ def _limit_of(text: str, where: str) -> Limit:
         names = ("payload", *NAMES, LINEAR_RANGE)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
-    if name == TOLERANCE:
+    if name == TOLERANCE or UNITS.get(name[0]) == "m":
         return Limit(name, _length_word(value, said))
     return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
@@ -687,7 +694,8 @@ def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) ->
 def _length_word(text: str, where: str) -> float:
     """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
     unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
-    return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)
+    value = number_word(text.removesuffix(unit), where, "m, or a length as 20um or 0.02mm")
+    return value * _LENGTHS.get(unit, 1.0)
 
 
 def split_word(text: str) -> tuple[str, str]:

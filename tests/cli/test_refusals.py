@@ -95,6 +95,8 @@ BAD = {
     "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",
     "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
     "optimize ARCH --time-limit 5min": "not a positive number or zero; give a number of s",
+    "optimize ARCH --limit D_max=20": "--limit D_max=20: 20 m is more than the structure's size, ",
+    "optimize ARCH --limit D_max=2in": "'2in' is not a positive number; give a number of m, or a",
     "optimize ARCH --limit F_largest=300N": "'300N' is not a positive number; give a number of N",
     "optimize ARCH --robots rob1 --aim minmx": "aim 'minmx' does not exist (did you mean minmax?)",
     "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
