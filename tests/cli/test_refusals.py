@@ -127,7 +127,7 @@ NO_ANSWER = {
     f"{FREE} --budget sum(T_max)=0": "no plan is within all budgets; sum(T_max) is at least",
     "optimize arch25 --limit F_largest=9": "in which no grip is open, has F_largest=",
     "optimize SIX --limit T_max=17": "it becomes possible with T_max=18.6",
-    "optimize SIX --budget travel=0.1m": "travel is at least 1.42463, and 0.1 is",
+    "optimize SIX --budget travel=0.1m": "travel is at least 1.42463 m, and 0.1 m is",
 }
 NOT_FOUND = {  # by a search that left something out, or had no time
     "optimize arch25 --formulation cascade --no-proof --limit T_max=64": "no grip is allowed",
