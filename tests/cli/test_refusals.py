@@ -82,7 +82,7 @@ BAD = {
     f"{FREE} --from 3 --to 2": "cannot end with 2",
     f"{FREE} --to PLAN:x": "give PLAN:STEP",
     f"{FREE} --order search --formulation pareto_zones": "or order_search",
-    f"{FREE} --order search --max-memory 1B": "option max_memory: it is too little",
+    f"{FREE} --order search --max-memory 1B": "error: --max-memory: it is too little",
     "optimize ARCH --order search --schedule loop": "orders, parts of builds, and steps",
     # what does not go together, as help says
     "optimize ARCH --limits payload": "--limits payload (did you mean --limit?)",
