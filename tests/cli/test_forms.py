@@ -193,6 +193,7 @@ def test_options_reach_the_scene(tmp_path):
     assert status_of("import", path, *words, *stiff, "--out", out) == 0
     scene = load_scene(out)
     assert (scene.name, len(scene.robots), len(scene.bricks)) == ("stack", 2, 2)
+    assert "no more than 100 µm apart" in " ".join(scene.provenance.split())
     assert scene.joints[0].translational_stiffness == pytest.approx((2e5, 1e5, 1e5))
 
 

@@ -207,6 +207,13 @@ def test_what_is_taken_is_said_in_one_line(capsys, here):
     assert "steps: of" not in err
 
 
+def test_times_names_every_file_that_it_writes(capsys, here):
+    _, said, _ = command(capsys, "times", "arch.json", "--out", "out")
+    names = said.splitlines()[-1].removeprefix("written to out: ").split(", ")
+    assert {*names} == {path.name for path in (here / "out").iterdir()}
+    assert {"plan.csv", "times.csv"} < {*names}
+
+
 def test_files_are_named_by_the_scene(capsys, here):
     _, _, err = command(capsys, "instance", "arch.json")
     (written,) = here.glob("*.npz")
