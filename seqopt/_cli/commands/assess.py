@@ -73,7 +73,7 @@ def run(
     if map is not None:
         others = {"margins": "", "friction": ", or give --map friction=0.3", "workers": ""}
         others |= {"mortar": ", or give --holds"}
-        for name in others.keys() & asked.words.keys():
+        for name in (each for each in others if each in asked.words):
             said = f"--{name}: not allowed with --map; leave one of them out{others[name]}"
             raise ProblemError(said)
         return _map(words, map, named(holds or "dry,epoxy"), output, progress)
