@@ -88,7 +88,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
     if isinstance(stop, KeyboardInterrupt):
         return stop
     if str(stop) == "memory":
-        return ProblemError("option max_memory: it is too little to find a plan; give more")
+        return ProblemError("max_memory: it is too little to find a plan; give more")
     return TimeUpError("no plan was found yet; give more")
 
 

@@ -34,7 +34,7 @@ class SeqoptError(Exception):
     ...     seqopt.load_scene("wall:columns=x,courses=4")
     ... except seqopt.SeqoptError as error:
     ...     print(error)
-    scene wall:columns=x,courses=4: columns is 'x'; give it as 12
+    scene wall:columns=x,courses=4: columns is 'x'; give a whole number, as 12
     """
 
 

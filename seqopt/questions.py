@@ -229,7 +229,7 @@ def assess(  # noqa: PLR0913  # every question is a word of its own
     friction : float, optional
         Coefficient of friction of all joints (default: that of the mortar).
     workers : int, optional
-        Processes to share the steps among (default: {default}).
+        Processes to share the steps among (default: 1).
     robots, cache, progress : optional
         As of `optimize`.
 
@@ -276,7 +276,7 @@ def pareto(  # noqa: PLR0913  # every question is a word of its own
         As of `optimize`.
     aim : str, optional
         What is to be small: responses and, of the free schedule, steps or regrips (default:
-        {default}).
+        F_largest,M_sup,T_max,D_max).
     criterion : Criterion or str, optional
         What a step costs, for the aim minmax: worst-ratio (over the least worst of fixed methods;
         default), another one that does not rank, or its name.
@@ -339,7 +339,7 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     build : Plan, str or pathlib.Path
         The plan, or the folder that seqopt optimize --out wrote.
     at : int, optional
-        Number of the last step that was done (default: {default}).
+        Number of the last step that was done (default: 1).
     lost, missing, payload, grips, durations, robots, to : optional
         As of `optimize`: what has changed, and where the rest ends.
     measured : str or pathlib.Path, optional

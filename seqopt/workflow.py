@@ -74,7 +74,7 @@ class Search:
         Seconds that posing, choosing and proof may take; the best choice by then has a lower bound;
         without proof, where choosing and computing are one, the moves that were chosen by then.
     workers : int, optional
-        Processes to share the work among; pays from about ten seconds (default: {default}).
+        Processes to share the work among; pays from about ten seconds (default: 1).
     executor : concurrent.futures.Executor, optional
         Who does the work in place of workers, as ``client.get_executor()`` of dask.
     cache : str or pathlib.Path, optional
@@ -162,9 +162,9 @@ class Robust:
         worst-peak (the largest cost of any step; default, also where only samples are described),
         worst-total (the largest total), or cvar=0.9 (the mean total of the worst tenth).
     count : int, optional
-        How many samples of the scene are drawn (default: {default}).
+        How many samples of the scene are drawn (default: 30).
     seed : int, optional
-        Which samples are drawn (default: {default}).
+        Which samples are drawn (default: 0).
     vary : mapping of str to float or sequence of str, optional
         How far samples are from the scene: stiffness=3 (of each joint, by a factor up to it, up or
         down), density=0.1 (of each brick, up to this share), position=0.002 (of each brick and
@@ -244,7 +244,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         ``stands`` or a free schedule, makespan_labels where a makespan counts, order_search where
         the order is sought).
     engine : str
-        What computes responses (default: {default}): compliance: exactly rigid bricks, fast; frame:
+        What computes responses (default: auto): compliance: exactly rigid bricks, fast; frame:
         stiff bars, a slow independent check; discrete: joints that open and slip; auto: compliance,
         and discrete where that is not enough.
     aim : str, optional
@@ -256,8 +256,9 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         found too.
     limits : sequence of Limit, Filter or str
         What no step may exceed: payload (of every robot), or RESPONSE=VALUE in SI units, as
-        F_largest=300; also where no grip is open. Plans keep the linear range wherever one does:
-        linear_range=any lifts that, 0.5 asks for half of it in every step.
+        F_largest=300, of lengths with their unit too, as D_max=20um; also where no grip is open.
+        Plans keep the linear range wherever one does: linear_range=any lifts that, 0.5 asks for
+        half of it in every step.
     budgets : sequence of str
         Cap on a total over the build, with the formulations labels, lagrangian, overlap_mip and
         overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m,

@@ -100,17 +100,17 @@ ITEMS = (
          "Table B.1 has 27.9 at step 86."),
     Item("table:experimental_data1", "Table A.1", "A", "the sequential method, step by step",
          also="figures",
-         why="[Where it disagrees](#where-it-disagrees) explains the differences.",
+         why="[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
     Item("table:experimental_data2", "Table A.2", "A", "the cantilever method, step by step",
          also="figures",
-         why="[Where it disagrees](#where-it-disagrees) explains the differences.",
+         why="[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
     Item("table:experimental_data3", "Table B.1", "B", "the three-robot plan, step by step",
          also="study.criteria_variants",
          why="Its responses took no part in the identification of the arch. The schedule is the "
          "loop's; its chosen nodes do not follow from the printed equations. "
-         "[Where it disagrees](#where-it-disagrees) explains the differences.",
+         "[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
 )  # fmt: skip
 

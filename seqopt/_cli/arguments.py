@@ -38,8 +38,8 @@ UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 METHODS = Later("seqopt.sequence.methods")  # of a wrong word alone
 WORD = re.compile(r"unrecognized arguments: (\w[\w-]*)")
 LEADS = {"limit": "limits", "option": "options", "round": "rounding"}
-NAMES = "begin criterion curing direction durations engine grips holds lost measured missing"
-NAMES += " mortar payload props reference robots rules stands to vary"
+NAMES = "begin criterion curing direction durations engine grips holds lost max_memory"
+NAMES += " measured missing mortar payload props reference robots rules stands to vary"
 LEADS |= {name: name for name in NAMES.split()}
 """Parameters, by the words that messages begin with."""
 LEAD = re.compile(r"\w+")

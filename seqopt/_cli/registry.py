@@ -60,7 +60,7 @@ COMMANDS = {
         ("times", "times", "say how long a build takes, and who does what when"),
         ("assess", "assess", "prove which steps stand, and with what margins"),
         ("report", "report", "make a page that shows plans step by step"),
-        ("reach", "reach", "say which arms reach which nodes, and how"),
+        ("reach", "reach", "say who reaches which nodes, and how"),
         ("scene", "scene", "check, describe, export or list scenes"),
         ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
         ("export", "exporting", "write a plan in a format of others"),

@@ -173,8 +173,7 @@ class Signature:
             if same and name in self.options:
                 like = COMMANDS.get(same[1], COMMANDS["optimize"])
                 text = signature_of(like.load()).texts()[name][1]  # noqa: PLW2901
-            default = self.options[name].default if name in self.options else ""
-            out[name] = value, text.replace("{default}", str(default))
+            out[name] = value, text
         return out
 
     @property
@@ -222,12 +221,11 @@ class Signature:
 
     def _help(self, option: Option, text: str) -> str:
         """Return the help of an option, with its names and default."""
-        text = self._spoken(text).replace("{choices}", ", ".join(option.choices))
-        text = text.removesuffix(".")
+        text = self._spoken(text).removesuffix(".")
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
-        if names := option.more.get("names"):
-            text += f"; names: {', '.join(names())}"
+        names = option.more.get("names", lambda: option.choices if option.name in VALUES else ())()
+        text += f"; names: {', '.join(names)}" if names else ""
         return text.replace("%", "%%")
 
 

@@ -17,6 +17,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Given
 from seqopt.exchange._meshes import Repaired, Surface
+from seqopt.responses.quantities import length_text
 from seqopt.scene._checks import as_vector, positive, short, units
 from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields
 from seqopt.scene.library.common import DOWN, JointLaw
@@ -250,7 +251,9 @@ def _find_contacts(
     Places are those of the file; the ground, which blocks not built belong to, comes first.
     """
     facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
-    said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
+    said = [
+        f"faces are found where blocks are no more than {length_text(float(f'{gap:.3g}'))} apart"
+    ]
     faces = list[_Held]()
     for pair, face in touching_faces(facets, gap, given.progress):
         a, b = (i if i in bricks else GROUND for i in pair)

@@ -33,7 +33,7 @@ def export(  # every question is a word of its own
         As of `seqopt.questions.find_build`. Arms are in their postures where these can be computed;
         other grips are proposals.
     format : str, optional
-        What to write (default: {default}): {choices}.
+        What to write (default: tasks).
     source : str or pathlib.Path, optional
         With compas_assembly: the assembly that was imported, to write the plan into.
     distance : float, optional

@@ -35,7 +35,7 @@ from seqopt.judge._proof import Proof, TooManyPartsError
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
-from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.sequence.rules import FREE, _RuleBook
 from seqopt.sequence.rules import _unbearable as too_heavy_steps
@@ -104,13 +104,14 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
             return SolverError(f"formulation {name} {ALLOWED}")
     said = list[str]()
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
-        goal, unit = problem.goals[k], " s" * problem.goals[k].in_time
+        goal = problem.goals[k]
         least = -np.inf  # of a makespan
         if not goal.in_time:
             least = distances(graph, graph.amounts[:, k])[graph.ends].min()
         alone = " by itself" if least <= tied(cap) else ""
-        at_least = f"{goal} is at least {least:.6g}{unit}{alone}, and " * bool(np.isfinite(least))
-        said.append(f"{at_least}{cap:g}{unit} is allowed")
+        at_least = f"{goal} is at least {value_text(goal.name, least)}{alone}, and "
+        at_least *= bool(np.isfinite(least))
+        said.append(f"{at_least}{value_text(goal.name, cap)} is allowed")
     proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
     why = f"{problem.title}: no plan is within all budgets; {', '.join(said)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)

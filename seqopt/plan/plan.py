@@ -32,8 +32,7 @@ from seqopt.problem.requirements import (
     overloads,
 )
 from seqopt.responses._grip_sets import Moved
-from seqopt.responses._tolerance import is_tolerance, values_text
-from seqopt.responses.quantities import length_text
+from seqopt.responses._tolerance import value_text, values_text
 from seqopt.responses.table import (
     FAR_OFF,
     OUTSIDE,
@@ -469,6 +468,5 @@ class Plan(ShownBuild):
             bound, claimed = proof.bounds[0], ""
         if not isfinite(bound):
             return "others are not looked at yet"
-        if is_tolerance(goal.name):  # of which more is better
-            return f"no order above {length_text(goal.shown(bound))}{claimed}"
-        return f"no order below {bound:.6g}{claimed}"
+        above = "below" if goal.show is None else "above"  # of a tolerance or tilt more is better
+        return f"no order {above} {value_text(goal.name, goal.shown(bound))}{claimed}"

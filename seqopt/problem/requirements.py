@@ -274,6 +274,33 @@ def _carrying_excesses(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Excess, 
     return tuple(out)
 
 
+class PayloadUse(NamedTuple):
+    """What a robot holds or carries in a step, over its payload."""
+
+    share: float
+    robot: str  # its name
+    step: int  # number
+    brick: int | None = None  # the one that it carries, placing or removing it; None if it holds
+
+
+def payload_uses(scene: Scene, table: _Columns) -> list[PayloadUse]:
+    """Return the share of its payload that every robot uses, by grips, then by bricks it carries.
+
+    ``table``: of `seqopt.analyze`.
+    """
+    out, numbers = [], np.asarray(table["step"], dtype=int).tolist()
+    for robot in scene.robots:
+        forces = _response_along(scene, table, robot_response(robot.name))
+        shares = np.nan_to_num(forces / robot.payload).tolist()
+        out += [PayloadUse(s, robot.name, n) for s, n in zip(shares, numbers, strict=True)]
+    every = [(robot, loads(scene, robot)) for robot in scene.robots]
+    for number, r, brick in carried(scene, _steps_in_table(scene, table)):
+        robot, load = every[r]
+        share = float(load[scene.since[brick] - 1]) / robot.payload
+        out.append(PayloadUse(share, robot.name, number, brick))
+    return out
+
+
 def _prop_faults(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     """Return in which steps props bear more than they may; see `_excesses`."""
     return _excesses(scene, table, _prop_limits(scene))
@@ -588,8 +615,8 @@ def parse_limits(
 ) -> tuple[Asked, ...]:
     """Return limits, filters and resources that are given as such, or in words.
 
-    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units,
-    ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
+    Words are ``payload``, of the scene's robots, ``RESPONSE=VALUE``, SI units or a length as
+    ``20um``, ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
     ``where``: for messages.
     """
     several = (given,) if isinstance(given, str | Asked) else given
@@ -606,7 +633,14 @@ def parse_limits(
         elif "=" not in each and each in (own := registered(Filter) | registered(Resource)):
             out.append(own[each])
         else:
-            out.append(_limit_of(each, where))
+            out.append(limit := _limit_of(each, where))
+            size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
+            size += max(max(brick.dimensions) for brick in scene.bricks)
+            if limit.response[0] == "D" and limit.bound > size:
+                raise ProblemError(
+                    f"{where} {each}: {limit.bound:g} m is more than the structure's size, "
+                    f"{length_text(float(size))}; give a length in m, or as 20um or 0.02mm"
+                )
     return tuple(out)
 
 
@@ -627,7 +661,7 @@ def _limit_of(text: str, where: str) -> Limit:
         names = ("payload", *NAMES, LINEAR_RANGE)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
-    if name == TOLERANCE:
+    if name == TOLERANCE or UNITS.get(name[0]) == "m":
         return Limit(name, _length_word(value, said))
     return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
@@ -683,7 +717,8 @@ def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) ->
 def _length_word(text: str, where: str) -> float:
     """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
     unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
-    return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)
+    value = number_word(text.removesuffix(unit), where, "m, or a length as 20um or 0.02mm")
+    return value * _LENGTHS.get(unit, 1.0)
 
 
 def split_word(text: str) -> tuple[str, str]:

@@ -538,7 +538,7 @@ def _about(comparison: Comparison) -> str:
     if comparison.printed is not None:
         said += " In brackets: what Bruun et al. print."
     if " +" in "".join(_responses(comparison)):
-        said += " +1, +2 …: so many other formulations reach the same figures."
+        said += " +1, +2 …: so many other methods or formulations reach the same figures."
     return said
 
 

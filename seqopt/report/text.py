@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from operator import itemgetter
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
-from seqopt.problem.requirements import _prop_faults, overloads
-from seqopt.responses.quantities import _plain, length_text, robot_response
+from seqopt.problem.requirements import _prop_faults, overloads, payload_uses
+from seqopt.responses.quantities import _plain, length_text
 from seqopt.responses.scales import _response_along
-from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
+from seqopt.responses.table import OUTSIDE, Departure, _Columns
 from seqopt.scene.scene import Scene
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import BuildVerdicts, _settlement_said
@@ -31,25 +30,18 @@ def _robot_words(name: str) -> str:
     return f"robot {found[1]}" if found else name.replace("_", " ")
 
 
-def _payload_shares(scene: Scene, table: pd.DataFrame) -> Floats:
-    """Return the share of its payload that every robot uses in every step, (n, r)."""
-    forces = table[[force_column(robot) for robot in scene.robots]].to_numpy(float)
-    payloads = np.array([robot.payload for robot in scene.robots])
-    return np.asarray(np.nan_to_num(np.abs(forces)) / payloads)
-
-
 def _headline(scene: Scene, table: _Columns) -> str:
-    """Return how much a robot holds and a node moves at most in a build, to three digits.
+    """Return how much a robot holds, carries of its payload, and a node moves at most in a build.
 
-    ``table``: of `seqopt.analyze`. The share is that of the payload of the robot that holds most.
+    ``table``: of `seqopt.analyze`. Numbers have three digits.
     """
-    along = [_response_along(scene, table, robot_response(robot.name)) for robot in scene.robots]
-    forces = [float(np.nanmax(each, initial=0.0)) for each in along]
-    force, robot = max(zip(forces, scene.robots, strict=True), key=itemgetter(0))
-    moved = float(np.nanmax(_response_along(scene, table, "D_max"), initial=0.0))
-    share = _plain(100 * force / robot.payload, 3)
-    said = f"largest force {_plain(force, 3)} N ({share} % of payload)"
-    return f"{said}, displacement {length_text(float(f'{moved:.3g}'))}"
+    along = [_response_along(scene, table, name) for name in ("F_largest", "D_max")]
+    force, moved = (float(np.nanmax(each, initial=0.0)) for each in along)
+    use = max(payload_uses(scene, table), key=attrgetter("share"))
+    does = "" if use.brick is None else f" carries brick {use.brick}"
+    said = f"largest force {_plain(force, 3)} N; payloads used up to {_plain(100 * use.share, 3)} %"
+    said += f" ({use.robot}{does}, step {use.step})"
+    return f"{said}; displacement {length_text(float(f'{moved:.3g}'))}"
 
 
 def _deciding_step(
@@ -69,7 +61,8 @@ def _deciding_step(
     wrong += [each.first for each in verdicts[-1:] if each.first]
     if wrong:
         return min(wrong) - int(table["step"].iloc[0])
-    return int(_payload_shares(scene, table).max(axis=1).argmax())
+    most = max(payload_uses(scene, table), key=attrgetter("share"))
+    return most.step - int(table["step"].iloc[0])
 
 
 def _in_a_sentence(
@@ -93,10 +86,10 @@ def _in_a_sentence(
     if wrong:
         said = [f"Not buildable: {'; '.join(wrong)}"]
     if not over:
-        shares = _payload_shares(scene, table)
-        step, robot = divmod(int(shares.argmax()), len(scene.robots))
-        who = f"{_robot_words(scene.robots[robot].name)} in step {int(table['step'].iloc[step])}"
-        said.append(f"all within payload, {100 * shares.max():.0f} % at most ({who})")
+        most = max(payload_uses(scene, table), key=attrgetter("share"))
+        carries = "" if most.brick is None else f" carries brick {most.brick}"
+        who = f"{_robot_words(most.robot)}{carries} in step {most.step}"
+        said.append(f"all within payload, {100 * most.share:.0f} % at most ({who})")
     moves = _settlement_said(scene) if verdicts else ""
     said += [*_stands(verdicts[:-1] if fallen else verdicts), *([moves] if moves else [])] or (
         [] if verdicts else ["whether its steps stand was not asked"]

@@ -35,6 +35,8 @@ from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
 from seqopt.sequence.steps import Step
 
 COLUMN = "tolerance_mm"
+_UNITS = {"travel": " m", "makespan": " s", "bond": " Pa", "tilt": "°"}  # and of responses:
+_UNITS |= {"F_": " N", "T_": " N", "C_": " N", "M_": " N m", "D_": " m"}
 _AT_ONCE = 4096  # grip sets that are solved together
 _CLOSE = 1e-11  # share of itself by which a rate must grow for the search to go on
 _STEPS = 25  # of the search from one direction
@@ -50,11 +52,21 @@ def is_tolerance(name: str) -> bool:
 
 
 def values_text(values: Mapping[str, float]) -> str:
-    """Format values of aims or responses by name: lengths with their units, else six digits."""
-    return ", ".join(
-        f"{name} {length_text(value) if name in (TOLERANCE, 'D_max') else format(value, '.6g')}"
-        for name, value in values.items()
-    )
+    """Format values of aims or responses by name, with their units; see `value_text`."""
+    return ", ".join(f"{name} {value_text(name, value)}" for name, value in values.items())
+
+
+def value_text(name: str, value: float) -> str:
+    """Format a value of an aim, a budget or a response to six digits, with its unit if it has one.
+
+    >>> value_text("travel", 17.7484), value_text("D_max", 2e-5), value_text("sum(M_sup)", 3.0)
+    ('17.7484 m', '20 µm', '3 N m')
+    """
+    if name in (TOLERANCE, "D_max"):
+        return length_text(value)
+    of = name.removeprefix("sum(")  # the response, F_largest of sum(F_largest)
+    unit = _UNITS.get(name) or (_UNITS.get(of[:2], "") if of[1:2] == "_" else "")
+    return f"{value:.6g}{unit}"
 
 
 @dataclass(frozen=True)

@@ -495,7 +495,7 @@ def what_was_enough(within: LinearRange, builds: Mapping[str, _Columns]) -> Enou
         others = "what another one would change is not known"
     elif not known:
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
-        others = unknown + unchecked
+        others = unknown + (unchecked or "joints bear nothing that could be compared")
     elif below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
@@ -505,6 +505,8 @@ def what_was_enough(within: LinearRange, builds: Mapping[str, _Columns]) -> Enou
         others = "discrete elements were taken where joints open, elsewhere they change nothing"
     else:
         others = f"{unknown}{where} leaves its limits; the engine discrete says it"
+    if "not known" not in others and within.of_builds(builds):
+        others = f"{unknown.removesuffix(': ')} {OUTSIDE}"
     recipe = recipe_of(simplest(engine) if below >= 0 else engine)
     name = type(engine).__name__ if recipe is None else recipe.name
     left_out = tuple(_left_out(within, builds))

@@ -205,10 +205,9 @@ class Scene(Shown):
             why = "occurs twice" if name in names else "is no brick"
             raise SceneError(f"{where}: build_order: {name} {why}; name every brick once")
         if left := names - {*self.build_order}:
-            raise SceneError(
-                f"{where}: build_order: {len(left)} bricks are missing, {min(left)} among them; "
-                "name every brick once"
-            )
+            said = f"{len(left)} bricks are missing, {min(left)} among them"
+            said = f"brick {min(left)} is missing" if len(left) == 1 else said
+            raise SceneError(f"{where}: build_order: {said}; name every brick once")
         _known(f"{where}: blocked_nodes", "node", self.blocked_nodes, {*self.brick_of_node})
         for brick in self.bricks:
             if brick.placing_node in self.blocked_nodes:

@@ -145,7 +145,7 @@ def _vector(text: str) -> Vector:
 
 
 ORDER = "order"  # of any kind: in which bricks are placed
-_WHOLE, _NUMBER = (int, "it as 12"), (float, "a number alone, as 0.5")
+_WHOLE, _NUMBER = (int, "a whole number, as 12"), (float, "a number alone, as 0.5")
 _READ: dict[Any, Reader] = {
     int: _WHOLE,
     int | None: _WHOLE,

@@ -118,9 +118,9 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
     names, fit = (", ".join(scene.robots[r].name for r in some) for some in (robots, fits[role]))
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
     raise StepError(
-        f"robots {names}: not every role has a robot of its own: one places bricks {bricks}, all "
-        f"within reach of {fit or 'none'}; take the free schedule (--schedule free), extend a "
-        "reach, name other robots, or write a schedule of your own"
+        f"scene {scene.name}: not every role has a robot of its own of {names}: one places bricks "
+        f"{bricks}, all within reach of {fit or 'none'}; take the free schedule (--schedule free), "
+        "extend a reach, name other robots, or write a schedule of your own"
     )
 
 

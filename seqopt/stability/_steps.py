@@ -373,5 +373,7 @@ def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
         worst = int(np.nanargmin(values) if column == _TILT else np.nanargmax(values))
         value = words.format(f"{values[worst] * scale:.4g}")
         value = value if np.isfinite(values[worst]) else "no value is enough"
+        if column == _TILT and found[Verdict.FALLS.value]:  # others survive none
+            value = f"steps that stand {value.replace('survives', 'survive')}"
         ends += f"; {name}: {value} (step {rows[worst]['step']})"
     return f"{len(rows)} steps: {said}; proven {by}{ends}"

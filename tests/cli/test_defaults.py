@@ -1,5 +1,6 @@
 """What is taken where nothing is asked for; scenes on the command line."""
 
+import inspect
 import json
 
 import pandas as pd
@@ -94,6 +95,26 @@ def test_help_is_what_docstrings_say():
     assert compared["speed"][1].startswith("Also chart speed against regret")
     assert compared["mortar"] == ("optional", chosen["mortar"][1])
     assert "(default: auto)" in chosen["engine"][1]
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (seqopt.optimize, {"engine": "auto"}),
+        (seqopt.assess, {"workers": "1"}),
+        (seqopt.export, {"format": "tasks"}),
+        (seqopt.pareto, {"aim": "F_largest,M_sup,T_max,D_max"}),
+        (seqopt.replan, {"at": "1"}),
+        (seqopt.Search, {"workers": "1"}),
+        (seqopt.Robust, {"count": "30", "seed": "0"}),
+    ],
+)
+def test_defaults_that_docstrings_say_are_those_of_signatures(function, words):
+    texts, taken = signature_of(function).texts(), inspect.signature(function).parameters
+    assert "{" not in function.__doc__.partition("Examples")[0]  # no placeholder
+    for name, default in words.items():
+        assert f"(default: {default})" in texts[name][1], name
+        assert str(taken[name].default) == default
 
 
 def test_messages_about_parameters_name_options():

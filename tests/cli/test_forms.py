@@ -1,8 +1,10 @@
 """The three forms of an answer; where the command line reads and writes."""
 
 import json
+import math
 import os
 import stat
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,7 +14,8 @@ import pytest
 
 from seqopt._cli.answer import plain
 from seqopt._cli.main import main
-from seqopt.scene.scene_file import load_scene
+from seqopt.scene.parts import Sphere
+from seqopt.scene.scene_file import load_scene, save_scene
 from tests.commands import beside_models
 from tests.commands import command as run
 from tests.documents import BOXES, DOCUMENTS
@@ -190,4 +193,24 @@ def test_options_reach_the_scene(tmp_path):
     assert status_of("import", path, *words, *stiff, "--out", out) == 0
     scene = load_scene(out)
     assert (scene.name, len(scene.robots), len(scene.bricks)) == ("stack", 2, 2)
+    assert "no more than 100 µm apart" in " ".join(scene.provenance.split())
     assert scene.joints[0].translational_stiffness == pytest.approx((2e5, 1e5, 1e5))
+
+
+def test_robots_without_arms_reach_what_their_regions_cover(capsys, tmp_path):
+    wall = load_scene("wall:columns=3,courses=2")
+    near = Sphere(center=wall.bricks[0].position, radius=0.3)
+    robots = (replace(wall.robots[0], reach=near), *wall.robots[1:])
+    save_scene(wall.with_robots(*robots), tmp_path / "near.json")
+    status, said, _ = run(capsys, "reach", tmp_path / "near.json", "--out", tmp_path / "out")
+    nodes = [n for b in wall.bricks for n in b.nodes if n not in wall.blocked_nodes]
+    far = [n for n in nodes if math.dist(wall.node_position(n), near.center) > near.radius]
+    assert 0 < len(far) < len(nodes)
+    assert status == 0
+    lines = said.splitlines()
+    count = len(nodes) - len(far)
+    assert f"rob1: reaches {count} of {len(nodes)} nodes (0.3 m around (0, 0, 0.03))" in lines
+    assert f"  never: {', '.join(map(str, far))}" in lines
+    assert f"rob2: reaches {len(nodes)} of {len(nodes)} nodes (anywhere)" in lines
+    table = pd.read_csv(tmp_path / "out" / "reach.csv")
+    assert table[table["robot"] == "rob1"]["node"].tolist() == [n for n in nodes if n not in far]

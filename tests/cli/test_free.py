@@ -78,7 +78,8 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     status, said, _ = run(capsys, "optimize", arch, *words, "--out", str(out))
     assert status == 0
     assert re.match(
-        r"largest force [0-9.]+ N \(.* of payload\), .*; F_largest .*, optimal, no", said
+        r"largest force [0-9.]+ N; payloads used .*; displacement .*; F_largest .*, optimal, no",
+        said,
     )
     assert "\norder_search (exact): 10 steps, " in said
     summary = json.loads((out / "summary.json").read_text())

@@ -25,7 +25,9 @@ def test_optimize_begins_with_what_robots_hold(capsys, tmp_path):
     first, second, *_ = said.splitlines()
     number = r"([0-9.,]+)"
     found = re.match(
-        rf"largest force {number} N \({number} % of payload\), displacement {number} µm", first
+        rf"largest force {number} N; payloads used up to {number} % \(rob[123], step [0-9]+\); "
+        rf"displacement {number} µm",
+        first,
     )
     force, share, moved = map(float, found.groups())
     table = pd.read_csv(out / "plan.csv")

@@ -58,7 +58,7 @@ def test_sizes(text, size):
 def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
     out = ["--out", str(tmp_path / "out")]
     assert main([*WORDS, "overlap_dp", *out, "--max-memory", "100kB"]) == 2
-    said = "--option max_memory: it is too little to find a plan; give more"
+    said = "--max-memory: it is too little to find a plan; give more"
     assert capsys.readouterr().err == f"seqopt: error: {said}\n"
     assert not (tmp_path / "out").exists()
 

@@ -14,7 +14,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks, small_arch
 from tests.commands import command
 
-VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential --mortar dry"
+VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential"
 FREE = "optimize ARCH --schedule free"
 ROBUST = "optimize SIX --robust"
 WALL = "wall:columns=2,courses=2"
@@ -82,7 +82,7 @@ BAD = {
     f"{FREE} --from 3 --to 2": "cannot end with 2",
     f"{FREE} --to PLAN:x": "give PLAN:STEP",
     f"{FREE} --order search --formulation pareto_zones": "or order_search",
-    f"{FREE} --order search --max-memory 1B": "option max_memory: it is too little",
+    f"{FREE} --order search --max-memory 1B": "error: --max-memory: it is too little",
     "optimize ARCH --order search --schedule loop": "orders, parts of builds, and steps",
     # what does not go together, as help says
     "optimize ARCH --limits payload": "--limits payload (did you mean --limit?)",
@@ -95,6 +95,8 @@ BAD = {
     "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",
     "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
     "optimize ARCH --time-limit 5min": "not a positive number or zero; give a number of s",
+    "optimize ARCH --limit D_max=20": "--limit D_max=20: 20 m is more than the structure's size, ",
+    "optimize ARCH --limit D_max=2in": "'2in' is not a positive number; give a number of m, or a",
     "optimize ARCH --limit F_largest=300N": "'300N' is not a positive number; give a number of N",
     "optimize ARCH --robots rob1 --aim minmx": "aim 'minmx' does not exist (did you mean minmax?)",
     "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
@@ -105,11 +107,16 @@ BAD = {
         f"compare arch25 --speed={word}": f"--speed: '{word}' is not a positive number"
         for word in ("x", "-1", WALL)
     },
-    f"{VLR} --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or some of",
+    f"{VLR} --mortar dry --margins tillt": "margin 'tillt' (did you mean tilt?): give all, or",
     f"{VLR} --map wind": "--map wind: give friction or tilt, with values as",
     f"{VLR} --map tilt=60": "--map tilt=60: 60 is too much; give tilt from 0 to 45",
     f"{VLR} --map friction=x": "--map friction=x: 'x' is not a positive number or zero",
     f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
+    f"{VLR} --map friction --margins bond": "--margins: not allowed with --map; leave one",
+    f"{VLR} --map friction --friction 0.3": "of them out, or give --map friction=0.3",
+    f"{VLR} --map friction --mortar dry": "--mortar: not allowed with --map; leave one of them",
+    f"{VLR} --map friction --workers 2": "--workers: not allowed with --map; leave one of them",
+    f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }
 NO_ANSWER = {
     f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
@@ -120,7 +127,7 @@ NO_ANSWER = {
     f"{FREE} --budget sum(T_max)=0": "no plan is within all budgets; sum(T_max) is at least",
     "optimize arch25 --limit F_largest=9": "in which no grip is open, has F_largest=",
     "optimize SIX --limit T_max=17": "it becomes possible with T_max=18.6",
-    "optimize SIX --budget travel=0.1m": "travel is at least 1.42463, and 0.1 is",
+    "optimize SIX --budget travel=0.1m": "travel is at least 1.42463 m, and 0.1 m is",
 }
 NOT_FOUND = {  # by a search that left something out, or had no time
     "optimize arch25 --formulation cascade --no-proof --limit T_max=64": "no grip is allowed",
@@ -198,6 +205,13 @@ def test_what_is_taken_is_said_in_one_line(capsys, here):
     assert "durations: not known, taken as fetch=30,place=10" in err
     _, _, err = command(capsys, "analyze", "arch.json", "--method", "cantilever")
     assert "steps: of" not in err
+
+
+def test_times_names_every_file_that_it_writes(capsys, here):
+    _, said, _ = command(capsys, "times", "arch.json", "--out", "out")
+    names = said.splitlines()[-1].removeprefix("written to out: ").split(", ")
+    assert {*names} == {path.name for path in (here / "out").iterdir()}
+    assert {"plan.csv", "times.csv"} < {*names}
 
 
 def test_files_are_named_by_the_scene(capsys, here):

@@ -58,6 +58,14 @@ def test_help_has_every_option_once_and_examples_on_lines_of_their_own(printed, 
     assert [example for example in examples if f"\n  {example}\n" not in out] == []
 
 
+def test_help_lists_names_of_criteria_formulations_and_formats(printed):
+    said = " ".join(printed("optimize", "--help").split())
+    assert re.search(r"names: .*worst-ratio, .*names: .*cascade, ", said)
+    assert "; names: tasks, tasks_csv, compas_assembly" in " ".join(
+        printed("export", "--help").split()
+    )
+
+
 def test_help_without_a_command_fits_one_screen(printed):
     lines = printed("--help").splitlines()
     assert len(lines) <= 40

@@ -214,6 +214,9 @@ def test_words_are_the_same_in_python_and_on_the_command_line():
     scene = small_arch(3)
     assert parse_limits("linear_range=any", scene) == (LIFTED,)
     assert parse_limits(["linear_range=0.5", HARD], scene) == (Limit(LINEAR_RANGE, 0.5), HARD)
+    for words in ("20um", "0.02mm", "20e-6", "20µm"):
+        (limit,) = parse_limits(f"D_max={words}", scene)
+        assert (limit.response, limit.bound) == ("D_max", pytest.approx(20e-6, rel=1e-12))
     assert parse_limits(["F_largest=300", "tolerance=0.1mm"], scene) == (
         Limit("F_largest", 300.0),
         Limit("tolerance", 0.1 * 1e-3),

@@ -305,6 +305,20 @@ def test_ranges_that_are_none_are_refused(words, said, capsys):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        (["chain:bricks=7", "--payload", "5..1"], 2),
+        (["chian:bricks=7"], 2),
+        (["chain:bricks=7", "--limit", "F_largest=0.1"], 3),
+        (["chain:bricks=7", "--time-limit", "0"], 4),
+        (["chain:bricks=7", "--over", "payload=0.1,x"], 3),  # one of them is infeasible
+    ],
+)
+def test_a_sweep_without_any_plan_has_the_status_of_its_rows(words, status, capsys):
+    assert told(*words, "--no-stability") == status
+
+
 def test_workers_begin_with_the_largest_of_a_range():
     """Ranges go up: else the largest problem would end alone."""
     begun = []

@@ -7,13 +7,15 @@ import re
 from dataclasses import replace
 from html import escape
 
+import numpy as np
 import pytest
 from PIL import Image
 
 import seqopt
 from seqopt.problem.problem import Orders
+from seqopt.problem.requirements import payload_uses
 from seqopt.report.page import Build, report_page
-from seqopt.report.text import _deciding_step, _in_a_sentence
+from seqopt.report.text import _deciding_step, _headline, _in_a_sentence
 from seqopt.responses.table import Departure, analyze, force_column
 from seqopt.sequence.methods import sequential
 from seqopt.stability.assessment import Verdict
@@ -102,6 +104,33 @@ def test_one_sentence_says_what_can_be_acted_on(engine25, table):
     unknown = _in_a_sentence(scene, table, [dry(3, 4, verdict=OPEN)])
     assert "of 2 steps it is not known whether they stand dry" in unknown
     assert "every step" not in unknown
+
+
+@pytest.mark.parametrize(
+    ("payloads", "robot", "brick", "step"),
+    [(["rob2=250"], "rob2", None, 44), (["rob1=80"], "rob1", 1, 1), (["rob2=80"], "rob2", 2, 2)],
+)
+def test_the_largest_share_is_of_any_robot_held_or_carried(
+    engine25, table, payloads, robot, brick, step
+):
+    scene = engine25.network.scene.with_payloads(*payloads)
+    quiet = table.copy()
+    if brick is not None:  # what is carried counts where grips bear little
+        for each in scene.robots:
+            quiet[force_column(each)] *= 0.01
+    weight = {b.name: b.mass * np.linalg.norm(scene.gravity) for b in scene.bricks}
+    held = table["F_rob2_N"].abs().max() if brick is None else weight[brick]
+    payload = next(r.payload for r in scene.robots if r.name == robot)
+    use = max(payload_uses(scene, quiet), key=lambda each: each.share)
+    assert use[1:] == (robot, step, brick)
+    assert use.share == pytest.approx(held / payload)
+    does = "" if brick is None else f" carries brick {brick}"
+    assert f"payloads used up to {100 * use.share:.3g} % ({robot}{does}, step {step}); " in (
+        _headline(scene, quiet)
+    )
+    if use.share <= 1:
+        said = _in_a_sentence(scene, quiet)
+        assert f"{100 * use.share:.0f} % at most (robot {robot[-1]}{does} in step {step})" in said
 
 
 def test_what_cannot_be_built_is_said_first(engine25, table):

@@ -582,6 +582,21 @@ def test_beyond_elastic_limits_nothing_is_promised():
     assert moved > 1.01 * table["D_max_1e-3mm"][number - 1]
 
 
+def test_outside_the_linear_range_nothing_is_enough():
+    engine = seqopt.make_engine("auto", arch())
+    table = seqopt.analyze(engine, seqopt.sequential(engine.network))
+    assert what_was_enough(LinearRange(engine), {"": table}).lines[0].startswith("enough: ")
+    within = LinearRange(engine)
+    within.far = float(table["D_max_1e-3mm"].max()) / 7.3e6
+    said = "what discrete elements would change is not known outside the linear range"
+    assert what_was_enough(within, {"": table}).lines[0] == f"taken: compliance; {said}"
+
+
+def test_without_weight_there_is_a_reason_why_nothing_is_known():
+    found, _, _ = enough(replace(arch(), gravity=(0.0, 0.0, 0.0)), "compliance")
+    assert found.others.endswith("is not known: joints bear nothing that could be compared")
+
+
 def test_what_is_left_out_is_that_of_the_run():
     found, _, _ = enough(arch(), "frame")
     assert "not known" in found.others

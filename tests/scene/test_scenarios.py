@@ -356,6 +356,7 @@ def test_from_all_ends_leaves_nothing_that_hangs():
     [
         ("backwards", "order 'backwards': give reversed, ends, or names of bricks"),
         ("1,2,3", "order: 2 bricks are missing, 4 among them"),
+        ("1,2,3,4", "order: brick 5 is missing; name every brick once"),
         ("1,2,3,4,4", "order: 4 occurs twice"),
         ((1, 2, 3, 4, 7), "order: 7 is no brick"),
         (7, "order is 7; give whole numbers"),

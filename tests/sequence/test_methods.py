@@ -418,6 +418,16 @@ def test_few_bricks_and_few_robots_work_or_get_one_line(method, bricks, robots):
     assert (bricks_at_end is not None) == works or method not in enough
 
 
+@pytest.mark.parametrize("method", ["three-robot", "loop"])
+def test_where_the_robots_of_a_scene_do_not_fit_the_scene_is_named(method):
+    scene = small_arch(6)
+    net = with_robots(scene, near(scene, "a", 1, 2), near(scene, "b", 1, 2), *anywhere(1))
+    with pytest.raises(StepError) as caught:  # no option that was not given
+        SCHEDULES[method](net)
+    said = f"scene {scene.name}: not every role has a robot of its own of a, b, rob1: one places"
+    assert str(caught.value).startswith(said)
+
+
 def test_a_brick_that_nobody_reaches_is_named():
     scene = small_arch(5)
     net = with_robots(scene, near(scene, "a", 1, 2), near(scene, "b", 1, 2))

@@ -357,3 +357,6 @@ def test_the_worst_margin_of_the_steps_is_said():
     table["tilt_survived_deg"] = [7.0, 3.0]
     said = "; friction: no value is enough (step 1); tilt: survives 3° at least (step 2)"
     assert format_rows(rows_of(table)).endswith(said)
+    table["verdict"], table["tilt_survived_deg"] = ["stands", "does not stand"], [7.0, np.nan]
+    said = "; tilt: steps that stand survive 7° at least (step 1)"
+    assert format_rows(rows_of(table)).endswith(said)

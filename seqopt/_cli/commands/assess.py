@@ -39,7 +39,7 @@ def run(
     asked: Annotated[Call, ("call", assess)],
     *,
     map: Annotated[str | None, ("value", "AXIS")] = None,  # noqa: A002  # the option's name
-    holds: str = "dry,epoxy",
+    holds: str | None = None,
     out: File = None,
     progress: Tell,
 ) -> Answer:
@@ -57,7 +57,7 @@ def run(
         of ``method`` or ``plan`` alone.
     holds : str, optional
         With ``map``: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, with commas
-        between them (default: {default}).
+        between them (default: dry,epoxy).
     out : pathlib.Path, optional
         CSV file to write (default: the table is printed, with ``quiet`` as CSV); with ``map`` a
         folder.
@@ -71,7 +71,14 @@ def run(
     words = {name: word for name, word in asked.words.items() if name != "mortar"}
     output, mortar = Output(out, words.get("scene"), words.get("plan")), asked.words.get("mortar")
     if map is not None:
-        return _map(words, map, named(holds), output, progress)
+        others = {"margins": "", "friction": ", or give --map friction=0.3", "workers": ""}
+        others |= {"mortar": ", or give --holds"}
+        for name in (each for each in others if each in asked.words):
+            said = f"--{name}: not allowed with --map; leave one of them out{others[name]}"
+            raise ProblemError(said)
+        return _map(words, map, named(holds or "dry,epoxy"), output, progress)
+    if holds is not None:
+        raise ProblemError(f"--holds {holds}: it goes with --map; give --map friction, say")
     output.keep_apart(out)
     own = find_mortar(mortar or "epoxy")
     (given, taken), rows = read_steps(words, progress), list[dict[str, Any]]()

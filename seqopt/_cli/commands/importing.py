@@ -41,7 +41,7 @@ def run(
     out : pathlib.Path
         Scene to write, JSON.
     format : str, optional
-        What the file is (default: what it looks like): {choices}.
+        What the file is (default: what it looks like).
     supports : str, optional
         Blocks that are the ground, by their keys in the file (default: those that it marks,
         else what stands at the lowest level).

@@ -74,13 +74,17 @@ def run(
     text = f"{len(table)} problem{'s' * (len(table) > 1)}: {counts}"
     none = "why" in table and bool(table["why"].notna().all())
     text += f" ({table['why'][0]})" if none else ""
+    found, status = {*table["status"]}, Status.DONE
+    if none:  # of words that are wrong for all nothing is known
+        status = Status.FAILED if "failed" in found else Status.BAD_INPUT
+        status = Status.NO_ANSWER if found & {"infeasible", "mechanism"} else status
     return Answer(
         {"rows": table},
         f"{text}; written to {out}" if written else "",
         data="" if written else csv_text(table),
         written=written,
         notes=figure_notes() if written else (text,),
-        status=Status.NO_ANSWER if none else Status.DONE,
+        status=status,
     )
 
 

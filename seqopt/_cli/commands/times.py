@@ -59,13 +59,16 @@ def run(asked: Annotated[Call, ("call", times)], *, out: Folder = None, progress
         least = build.makespan
     timed, tables = build.times(), {"plan.csv": build.responses, "times.csv": build.times}
 
+    made = dict[str, bytes | str]()
+
     def files() -> dict[str, bytes | str]:
-        texts = {name: csv_text(table()) for name, table in tables.items()}
-        return {**texts, **picture_files("times", lambda _: build.gantt())}
+        made.update({name: csv_text(table()) for name, table in tables.items()})
+        made.update(picture_files("times", lambda _: build.gantt()))
+        return made
 
     where = "--out DIR writes when every step happens, and a chart of it"
     if written := output.write(progress, files):
-        where = f"written to {out}: {', '.join(tables)}"
+        where = f"written to {out}: {', '.join(made)}"
     busy = busy_table(built, build.steps, build._waits)
     lines = [f"{built.name}: {len(build.steps)} steps take {makespan:.6g} s"]
     if least is not None:

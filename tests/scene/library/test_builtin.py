@@ -331,6 +331,7 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
     ("words", "said"),
     [
         ("arch:spn=2", "'spn' is none of its numbers (did you mean span?); give span, rise"),
+        ("wall:columns=2.5,courses=2", "columns is '2.5'; give a whole number, as 12"),
         ("arch:span=x", "span is 'x'; give a number alone, as 0.5"),
         ("arch:span=2,rise=1,dimensions=1x2", "dimensions is '1x2'; give it as 0.2x0.1x0.06"),
         ("wall:columns=4", "courses is missing; a wall in running bond: wall:columns=6"),
