@@ -725,8 +725,8 @@ def build_states(
     """
     named = _goals(goals, least=1)
     rules = rules.in_scene(engine.network.scene)
-    if isinstance(rules, FreeRules):
-        require_buildable(engine.network, rules)
+    if rules.method == FREE:
+        require_buildable(engine.network, rules.free())
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)
