@@ -11,6 +11,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.problem.criteria import RankSum, WeightedSum
 from seqopt.scene.parts import Anywhere, Robot
+from seqopt.stability.failure_map import failure_map
 from tests.builders import six_bricks
 
 SCENE = six_bricks()
@@ -73,6 +74,14 @@ WEIGHTS = (("T_max", 0.0, 1.0),)
 COARSE = RankSum("own", (("T_max", 1.0),), (("T_max", 1.0),), resolution=(("T", 0.0),))
 
 WRONG = {
+    "limit F_largest=-3: give a number from zero": lambda: seqopt.Limit("F_largest", -3),
+    "brick count None: the scene has 1 to": lambda: ENGINE.solve(None, [[1]]),
+    "brick count '3': the scene has 1 to": lambda: ENGINE.solve("3", [[1]]),
+    "brick count 3.5: the scene has 1 to": lambda: ENGINE.solve(3.5, [[1]]),
+    "builds: there are none; give one by its name": lambda: failure_map(SCENE, {}),
+    "robot: its name is empty; give one": lambda: Robot(name="", payload=1.0),
+    "a coefficient up to 2; 25° is 0.466": lambda: seqopt.assess(SCENE, None, friction=25),
+    "it has no robots; give at least one": lambda: seqopt.optimize(SCENE.with_robots(), "free"),
     "limit heavy does not exist; give": lambda: seqopt.optimize(SCENE, limits="heavy"),
     "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=[5]),
     "schedule 5: give a Schedule": lambda: seqopt.optimize(SCENE, 5),

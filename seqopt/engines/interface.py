@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network, network_of
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
@@ -178,8 +179,8 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     the shape is another, or a set names an unknown, blocked, unplaced or repeated node.
     """
     total = len(network.inner)
-    if not 1 <= bricks <= total:
-        raise GripError(f"brick count {bricks}: the scene has 1 to {total} bricks")
+    if not isinstance(bricks, int | np.integer) or not 1 <= bricks <= total:
+        raise GripError(f"brick count {short(bricks)}: the scene has 1 to {total} bricks")
     try:
         numbers = np.asarray(grips)
     except ValueError:

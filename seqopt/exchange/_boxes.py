@@ -29,8 +29,8 @@ def read_boxes(text: str, source: str) -> Content:
     names, found = read_table(text, source, SceneError)
     rows = [row for _, row in found]
     for line, row in found:
-        if None in row:  # beyond the columns
-            raise SceneError(f"{source}: line {line} has more cells than columns; remove them")
+        if len(row) > len(names):  # cells beyond the columns are under None
+            raise SceneError(f"{source}, line {line}: more cells than the {len(names)} columns")
     missing = [name for name in _NEEDED if name not in names]
     if missing:
         raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
@@ -40,11 +40,10 @@ def read_boxes(text: str, source: str) -> Content:
             raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
     if not rows or len(rows) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")
-    blocks = [_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)]
-    named = [block.key for block in blocks]
-    if twice := [name for name in named if named.count(name) > 1]:
-        raise SceneError(f"{source}: block {short(twice[0])} occurs twice; give each its own name")
-    return Content(tuple(blocks), said=("a table of boxes: no faces",))
+    return Content(
+        tuple(_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)),
+        said=("a table of boxes: no faces",),
+    )
 
 
 def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:

@@ -120,6 +120,8 @@ def _bricks(
 ) -> dict[int, Brick]:
     """Return the bricks of the blocks that are built, by their places in the file."""
     keys = [block.key for block in content.blocks]
+    if twice := [key for key, count in Counter(keys).items() if count > 1]:
+        raise SceneError(f"block {twice[0]} occurs twice; give each its own name")
     numbers = block_numbers(keys)
     if [str(number) for number in numbers] != keys:
         shown = [f"{key} is {number}" for key, number in zip(keys, numbers, strict=True)]

@@ -312,7 +312,9 @@ def _payload(problem: States, look: Look, free: States | None) -> str:
         every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
         least = max(look.least(free, LARGEST), *(float(own.max()) for own in every))
     said, far = _payload_text(least), _beyond(problem.network, least)
-    return f"payload of {said} N (--payload {said}){far}"
+    soft = "; grips that give way (--grips 1e6) may do with less"
+    soft *= problem.network.scene.grip_kinds.rigid and not far
+    return f"payload of {said} N (--payload {said}){far}{soft}"
 
 
 def _beyond(network: Network, force: float) -> str:

@@ -109,9 +109,7 @@ class Limit:
         if is_tolerance(self.response) and not self.bound > 0:
             raise ProblemError(f"limit tolerance={self.bound:g}: give a length above zero, m")
         if self.response[:1] in ("F", "M", "D") and self.bound < 0:
-            raise ProblemError(
-                f"limit {self.response}={self.bound:g}: it is a size; give at least 0"
-            )
+            raise ProblemError(f"limit {self.response}={self.bound:g}: give a number from zero")
         if self.response == LINEAR_RANGE and not self.bound > 0:
             raise ProblemError(f"limit linear_range={self.bound:g}: give a share above zero")
 

@@ -437,7 +437,8 @@ class Robot(Terse):
     durations: Durations | None = None
 
     def __post_init__(self) -> None:
-        printable("robot", self.name)
+        if not printable("robot", self.name):
+            raise SceneError("robot: its name is empty; give one")
         where, reach = f"robot {self.name}", self.reach
         if isinstance(reach, str) and reach == "anywhere":
             settle(self, reach=Anywhere())

@@ -27,6 +27,7 @@ from seqopt.contact.mortar import (
     _with_mortar,
     bond_mortar,
     find_mortar,
+    with_friction,
 )
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, build_network
@@ -319,6 +320,8 @@ def failure_map(
     """
     if axis not in AXES:
         raise SceneError(f"axis {axis!r}: give one of {', '.join(AXES)}")
+    if not builds:
+        raise SceneError("builds: there are none; give one by its name")
     values, least = values or AXES[axis], DRY.friction if axis == "friction" else 0.0
     usual = min(values, key=lambda value: abs(value - least))
     asked = [*_cases(scene, builds, holds, axis, values)]
@@ -350,7 +353,7 @@ def _cases(
         for held in holds:
             mortar = find_mortar(held)
             for value in values:
-                own = replace(mortar, friction=value) if axis == "friction" else mortar
+                own = with_friction(mortar, value if axis == "friction" else None)
                 yield value, _Case(name, steps, held, own, turned[value])
 
 

@@ -22,6 +22,12 @@ BAD = {
     # commands, scenes, files
     "--engine": "COMMAND",
     "analyze arch52 --method sequential": "scene arch52",
+    "assess arch25 --method sequential --friction 25": "a coefficient up to 2; 25° is 0.466",
+    f"{FREE} --stands dry --friction 25": "a coefficient up to 2; 25° is 0.466",
+    "scene arc:span=2,rise=.8": "did you mean arch?",
+    "times arch25 --method cantilever --curing 15min": "give --stands epoxy",
+    "optimize BARE --schedule free": "it has no robots; give at least one",
+    "assess BARE": "it has no robots; give at least one",
     "analyze no/such.json --method sequential": "no/such.json",
     "analyze --plan no.csv": "no.csv",
     "analyze --method sequential --plan no.csv": "not allowed with",
@@ -66,7 +72,7 @@ BAD = {
     f"{FREE} --formulation pareto_zones": "pareto_zones is for Pareto sets",
     f"{FREE} --criterion equations-2-3": "it ranks the choices of a move",
     f"{FREE} --tilt 3": "--tilt: it goes with --stands",
-    f"{FREE} --stands dry --tilt 90": "give an angle from 0 to below pi/2",
+    f"{FREE} --stands dry --tilt 90": "--tilt 90: give an angle from 0 to below 90 degrees",
     f"{FREE} --stands dry --rule payload=ignored": "holds up anything",
     f"{FREE} --aim minmax,tilt": "name bond, friction and tilt before all others",
     f"{FREE} --budget trips=0.8": "give travel=3.5m, makespan=600s, regrips=2",
@@ -119,6 +125,7 @@ BAD = {
     f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }
 NO_ANSWER = {
+    f"{FREE} --payload 20": "grips that give way (--grips 1e6) may do with less",
     f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
     f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
     f"{FREE} --stands bond=1e-9 --friction 0.01": "a bond of ",
@@ -142,12 +149,14 @@ NOT_FOUND = {  # by a search that left something out, or had no time
 def scenes(tmp_path_factory):
     """Paths of scenes, and of a plan, by the words that stand for them."""
     home = tmp_path_factory.mktemp("scenes")
-    for name, scene in (("ARCH", small_arch(5)), ("SIX", six_bricks())):
+    bare = small_arch(5).with_robots()
+    made = {"ARCH": small_arch(5), "SIX": six_bricks(), "BARE": bare}
+    for name, scene in made.items():
         save_scene(scene, home / f"{name}.json")
     (home / "PLAN").mkdir()
     rows = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
     (home / "PLAN" / "plan.csv").write_text(rows, encoding="utf-8")
-    return {"ARCH": home / "ARCH.json", "SIX": home / "SIX.json", "PLAN": home / "PLAN"}
+    return {"PLAN": home / "PLAN"} | {name: home / f"{name}.json" for name in made}
 
 
 CASES = [(BAD, 2), (NO_ANSWER, 3), (NOT_FOUND, 4)]
@@ -162,7 +171,7 @@ def test_it_is_one_line_and_writes_nothing(
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("seqopt.work.GRACE", 60.0)  # posing is not late on a busy machine
-    words = re.sub("ARCH|SIX|PLAN", lambda found: str(scenes[found[0]]), words).split()
+    words = re.sub("ARCH|SIX|BARE|PLAN", lambda found: str(scenes[found[0]]), words).split()
     more = ["--out", "out"] if words[0] == "optimize" else []
     found, out, err = command(capsys, *words, *more)
     assert (found, out, err.count("\n")) == (status, "", 1), err

@@ -188,6 +188,7 @@ def test_a_table_of_boxes(read):
     assert "numbered from 1" in read("boxes.csv", names.replace(",90,", ",90,top")).provenance
 
 
+TWINS = "x,y,z,length,width,height,name,density\n0,0,1,2,1,2,a1,9\n0,0,2.5,2,1,1,a1,9\n"
 MASSES = "x,y,z,length,width,height,mass\n0,0,.03,.2,.1,.06,2.4\n0,0,.09,.2,.1,.06,1.92\n"
 
 
@@ -292,6 +293,8 @@ def test_what_can_be_mended_is_mended_and_said(read):
         ("a.stl", b"solid x\nfacet", METERS, "a .stl cannot be read; open it in Rhino or Blender"),
         ("a.csv", BOXES.replace("yaw", "angle"), METERS, "column 'angle' is not known"),
         ("a.csv", BOXES.replace(".75,", "nan,", 1), METERS, "row 2: x is 'nan'; give a number"),
+        ("a.csv", BOXES + "0,0,9,1,1,1,90,1,1,1,1,1,1,1\n", METERS, "more cells than the"),
+        ("a.csv", TWINS, METERS, "block a1 occurs twice; give each its own name"),
         ("a.csv", MASSES.replace("2.4", "-2.4"), METERS, "row 1: mass is -2.4; give a positive nu"),
         (
             "a.csv",
