@@ -97,7 +97,7 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     return rough and mortar.tensile_strength >= pulled and mortar.cohesion >= other.cohesion
 
 
-def with_friction(mortar: Mortar, friction: float | None) -> Mortar:
+def _with_friction(mortar: Mortar, friction: float | None) -> Mortar:
     """Return a mortar with another coefficient of friction, if one is given.
 
     A `SceneError` says of more than `_ROUGHEST` what an angle of as many degrees is.

@@ -43,7 +43,7 @@ from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, Scenari
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence.rules import FREE, FreeRules, require_buildable
+from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
@@ -726,7 +726,7 @@ def build_states(
     named = _goals(goals, least=1)
     rules = rules.in_scene(engine.network.scene)
     if rules.method == FREE:
-        require_buildable(engine.network, rules.free())
+        _require_buildable(engine.network, rules.free())
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)

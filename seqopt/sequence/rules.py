@@ -365,7 +365,7 @@ def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules
     return found
 
 
-def require_buildable(network: Network, rules: FreeRules) -> None:
+def _require_buildable(network: Network, rules: FreeRules) -> None:
     """Raise a `StepError` without robots, or where a brick hangs free once they have let go."""
     scene, last = network.scene, rules.span(network.scene)[1]
     if not scene.robots:

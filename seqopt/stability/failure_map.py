@@ -24,10 +24,10 @@ from seqopt.contact.mortar import (
     Mortar,
     _is_as_strong,
     _mortar_name,
+    _with_friction,
     _with_mortar,
     bond_mortar,
     find_mortar,
-    with_friction,
 )
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, build_network
@@ -353,7 +353,7 @@ def _cases(
         for held in holds:
             mortar = find_mortar(held)
             for value in values:
-                own = with_friction(mortar, value if axis == "friction" else None)
+                own = _with_friction(mortar, value if axis == "friction" else None)
                 yield value, _Case(name, steps, held, own, turned[value])
 
 

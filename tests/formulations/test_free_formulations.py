@@ -122,7 +122,7 @@ def test_limits_that_leave_no_plan_are_said(name):
 @every
 def test_what_does_not_fit_gets_one_line(name):
     for option, value in {"speed": 2, **dict.fromkeys(ALL[name].options, 0)}.items():
-        said = "option|(width|charge|most|horizon) is 0|no plan was found yet; give more"
+        said = "option|(width|charge|most|horizon) is 0|max_memory|no plan was found yet; give more"
         said = "speed: " if option == "speed" else said
         with pytest.raises((ProblemError, TimeUpError), match=said) as caught:
             seqopt.solve(posed("minmax"), name, **{option: value})

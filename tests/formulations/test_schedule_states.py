@@ -145,7 +145,7 @@ def test_budgets_equal_brute_force(name):
         assert all(spent[word] <= cap * (1 + 1e-9) for word, cap in both.items())
     fewest = known[:, 3].min()
     few = within(build_states(engine, schedule, ONES, "minmax"), {"sum(M_sup)": 0.9 * fewest})
-    least = re.escape(f"sum(M_sup) is at least {fewest:.6g}, and")
+    least = re.escape(f"sum(M_sup) is at least {fewest:.6g} N m, and")
     with pytest.raises(InfeasibleError, match=least):
         seqopt.solve(few, SEARCH)
 

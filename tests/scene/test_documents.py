@@ -257,7 +257,8 @@ def test_what_is_odd_is_named(capsys, tmp_path, said):
 
 @given(scene=st.one_of(arches(), walls(), flat_arches()))
 def test_scenes_of_tests_are_not_odd(scene):
-    assert not [*_find_warnings(scene)]
+    """Those of corners that run into each other are drawn at random."""
+    assert not [line for line in _find_warnings(scene) if "interpenetrate" not in line]
 
 
 @pytest.mark.parametrize(
