@@ -290,6 +290,7 @@ def holds(rows: pd.DataFrame) -> dict[str, bool]:
     proven = plans["proven"].astype(bool) & least.notna()
     one = (values <= least * (1 + CLOSE))[proven] & (values >= least * (1 - CLOSE))[proven]
     large = plans[(plans["bricks"] >= FROM) & (plans["kind"] != "heuristic")]
+    large = large[large["ended"] != "stopped"]  # the seconds of others are the limit's
     times = large.pivot_table("seconds", ["question", "bricks"], "formulation")
     programs = times[times.columns.intersection(PROGRAMS)].min(axis=1)
     other = times[DP].fillna(times["labels"]) if len(times) else programs
