@@ -24,7 +24,6 @@ from seqopt.contact.mortar import (
     Mortar,
     _is_as_strong,
     _mortar_name,
-    _with_friction,
     _with_mortar,
     bond_mortar,
     find_mortar,
@@ -353,7 +352,7 @@ def _cases(
         for held in holds:
             mortar = find_mortar(held)
             for value in values:
-                own = _with_friction(mortar, value if axis == "friction" else None)
+                own = replace(mortar, friction=value) if axis == "friction" else mortar
                 yield value, _Case(name, steps, held, own, turned[value])
 
 
