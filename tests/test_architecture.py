@@ -56,7 +56,7 @@ SHARED = {  # what formulations may import
     "formulations.times._stages",
 }
 MECHANICS = {"network._mechanics", "engines.rigid"}  # not for the frame
-LINES = 510  # of code: no thought is split for a limit; imports, docstrings and comments aside
+LINES = 450  # of code: no thought is split for a limit; imports, docstrings and comments aside
 LINES_OF_A_FUNCTION = 50  # with signature and docstring, but where it documents its parameters
 LINES_OF_A_BODY = 46  # without both, of every function
 IMPORT = r"(?m)^ *((?:from .*)?\bimport (?:\([^)]*\)|.*))$"  # on one line, or in brackets

@@ -147,8 +147,8 @@ def demanded(
     names = [name for name, value in said.items() if value not in (None, ())]
     if stands is None:
         if names:
-            with_ = "epoxy" if names[0] == "curing" else "dry"
-            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {with_}, say")
+            usual = "epoxy" if names[0] == "curing" else "dry"
+            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {usual}, say")
         return None
     mortar = _with_friction(find_mortar(stands, "stands"), friction)
     if tilt is not None and not tilt < 90:

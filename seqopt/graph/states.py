@@ -26,7 +26,13 @@ from seqopt.problem.amounts import (
     StateArrays,
     judged_by,
 )
-from seqopt.problem.criteria import Criterion, Ranked, RankSum, _counts_every_step, state_costs
+from seqopt.problem.criteria import (
+    CandidateCosts,
+    Criterion,
+    RankSum,
+    _counts_every_step,
+    state_costs,
+)
 from seqopt.problem.problem import (
     WORST_PEAK,
     Aim,
@@ -43,7 +49,7 @@ from seqopt.responses._grip_sets import BAND, HERE, GripSets, Resources, Scenari
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
 from seqopt.stability.assessment import Stability
@@ -51,7 +57,7 @@ from seqopt.stability.standing import Standing, StandingSets, counted
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
-    from seqopt.sequence._space import Candidates, FreeSpace, ScheduleSpace
+    from seqopt.sequence._space import FreeSpace, ScheduleSpace
 
 _Valued = Callable[[Ints], tuple[Floats, Bools]]
 
@@ -616,87 +622,6 @@ class States(Shown):
         return replace(self.in_scene(strong(self.network.scene)), scenarios=worlds)
 
 
-class CandidateCosts:
-    """Costs of states among the candidates of the grips that are open in their step.
-
-    Ranks of responses are those among all candidates, whether or not a build reaches them: what is
-    undefined, as of one node for two robots, drops out before; limits and filters are asked later.
-    ``problem``: in one scene, whose criterion has costs only where a grip is open, or in all steps.
-    """
-
-    def __init__(self, problem: Any) -> None:
-        self._problem = problem
-        self._candidates: dict[int, Candidates] = {}
-        self._costs: dict[tuple[int, bool], Floats] = {}
-
-    def among(self, level: int, states: Ints, *, alone: bool = False) -> Floats:
-        """Return costs of states (n,) among all candidates of their level; zero if none is open.
-
-        ``alone``: of a step that two moves share, among the candidates of the later one.
-        """
-        problem = self._problem
-        if not problem.space.open_columns(level):
-            return np.zeros(len(states))
-        candidates, criterion = self._of(level), problem.criterion
-        if (level, alone) not in self._costs:
-            if alone and isinstance(criterion, RankSum):
-                criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
-            found = problem.seen(level, candidates.states, rough=True).responses
-            shaped = {name: candidates.spread(values) for name, values in found.items()}
-            self._costs[level, alone] = self._relative(level, criterion, shaped)
-        return np.asarray(self._costs[level, alone][candidates.rows(states)])
-
-    def _of(self, level: int) -> Candidates:
-        if level not in self._candidates:
-            self._candidates[level] = self._problem.space.candidates(level)
-        return self._candidates[level]
-
-    def _relative(self, level: int, criterion: Criterion, found: Mapping[str, Floats]) -> Floats:
-        """Return costs of choices by their responses; infinite where one is impossible."""
-        move = self._problem.space.decided_by(level)
-        known = {name: np.where(np.isfinite(v), v, np.nan) for name, v in found.items()}
-        costs = criterion.costs(known, move.bricks, len(move.candidates))
-        return np.where(np.isfinite(costs), costs, np.inf)
-
-    def of_branches(self, level: int, states: Ints) -> Floats:
-        """Return costs of states (n,) that follow from one by the candidates of its next move.
-
-        Ranks are those among all candidates of the move, also those that steps before turn down;
-        infinite is what is not within limits.
-        """
-        problem = self._problem
-        if not (len(states) and problem.space.open_columns(level)):
-            return np.zeros(len(states))
-        seen, fits = problem.responses(level, states, rough=problem.is_relative)
-        if not problem.is_relative:
-            costs = state_costs(problem.criterion, seen.responses, seen.bricks, seen.possible)
-        else:
-            *chosen, last = self._of(level).columns
-            every = self._of(level).states
-            every = every[(every[:, chosen] == states[0, chosen]).all(axis=1)]
-            every = every[np.argsort(every[:, last])]
-            found = problem.seen(level, every, rough=True).responses
-            costs = self._relative(level, problem.criterion, found)
-            costs = costs[np.searchsorted(every[:, last], states[:, last])]
-        return np.where(fits, costs, np.inf)
-
-    def charges(self, level: int, states: Ints) -> Floats:
-        """Return what a search of one move alone is charged of states, (n, 2).
-
-        First in steps in which one move is open, then in those that it shares with the one before.
-        """
-        problem = self._problem
-        if problem.each:
-            every = [one.candidates.charges(level, states) for one in problem.each]
-            return np.asarray(np.max(every, axis=0))
-        out, columns = np.zeros((len(states), 2)), problem.space.open_columns(level)
-        if columns and problem.is_relative:
-            out[:, int(len(columns) > 1)] = self.among(level, states, alone=True)
-        elif columns:
-            out[:, int(len(columns) > 1)] = problem.costs(level, problem.seen(level, states))
-        return out
-
-
 def _ascending(held: Ints, most: Floats) -> tuple[Ints, Floats]:
     """Return places held (n, r) in ascending order, and the payloads of their robots."""
     order = np.argsort(held, axis=1, kind="stable")
@@ -725,8 +650,6 @@ def build_states(
     """
     named = _goals(goals, least=1)
     rules = rules.in_scene(engine.network.scene)
-    if rules.method == FREE:
-        _require_buildable(engine.network, rules.free())
     limits = checked_limits(limits, engine.network, rules)
     if any(goal.of_criterion for goal in named):
         criterion = of_states(engine, criterion, rules)

@@ -190,6 +190,9 @@ def _why_impossible(problem: States, look: Look) -> str:
         helps = ", even if two rules or limits are loosened; extend a reach or add a robot"
         if found:
             helps = f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
+            if "--payload" in helps and "--grips" not in helps:
+                soft = "; grips that give way (--grips 1e6) may do with a smaller payload"
+                helps += soft * problem.network.scene.grip_kinds.rigid
         elif finished:  # nobody holds it
             most = "more bond or friction" if problem.demands else "stiffer joints"
             helps = f"; no robot helps: it needs {most}, less load, or other limits"
@@ -312,9 +315,7 @@ def _payload(problem: States, look: Look, free: States | None) -> str:
         every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
         least = max(look.least(free, LARGEST), *(float(own.max()) for own in every))
     said, far = _payload_text(least), _beyond(problem.network, least)
-    soft = "; grips that give way (--grips 1e6) may do with less"
-    soft *= problem.network.scene.grip_kinds.rigid and not far
-    return f"payload of {said} N (--payload {said}){far}{soft}"
+    return f"payload of {said} N (--payload {said}){far}"
 
 
 def _beyond(network: Network, force: float) -> str:

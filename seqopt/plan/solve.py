@@ -28,7 +28,7 @@ from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, L
 from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
 from seqopt.scene.arm import from_arms
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
 from seqopt.work import INTERRUPT
@@ -135,6 +135,8 @@ def _build_graph(problem: Problem) -> States:
         raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
     if problem.orders is not None and problem.paths:
         raise ProblemError(f"resource {problem.paths[0]}: it is kept in one order; give an order")
+    if problem.method == FREE:
+        _require_buildable(problem.engine.network, problem.moves.free())
     asked = problem.engine, problem.moves, problem.criterion, problem.goals, problem.limits
     found = build_states(*asked, problem.stands)
     check_parts(problem.filters, problem.scene, problem.moves)

@@ -12,7 +12,7 @@ import math
 import os
 import shlex
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, fields, is_dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -26,12 +26,12 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
 from seqopt.scene.arm import Arm, Durations
-from seqopt.scene.parts import Anywhere, Ground, Joint, Reach, Side, Sphere
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
 BOXES, networkx = Later("seqopt.scene.boxes"), Later("networkx")  # where a file is checked
-_CORNERS = 0.2  # of the thinner brick: how far corners of arches may run into each other
+_LEVEL = 1e-12  # slope of a line to a face, beyond which it meets it
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
@@ -65,7 +65,7 @@ def _find_odd_units(scene: Scene) -> Iterator[str]:
 def _find_warnings(scene: Scene) -> Iterator[str]:
     """Yield warnings about a scene, one line each; most scenes have none."""
     yield from _find_odd_units(scene)
-    yield from _find_overlapping(scene)
+    yield from _find_overlapping(scene, across_joints=True)
     ties = networkx.Graph(
         [joint.bricks for joint in scene.joints if any(joint.translational_stiffness)]
     )
@@ -96,25 +96,43 @@ def warn_of(scene: Scene, name: str, *, made: bool = False) -> None:
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
-def _find_overlapping(scene: Scene) -> Iterator[str]:
+def _find_overlapping(scene: Scene, *, across_joints: bool = False) -> Iterator[str]:
     """Yield a line on each pair of bricks that interpenetrate by more than `TOLERATED`.
 
-    Bricks of arches may run into each other at their corners, across a joint without a face: more
-    than `_CORNERS` is no corner. Beams do by intent: bricks with a shape and such joints.
+    Bricks of arches may run into each other at the corners of a joint without a face: how deep they
+    do counts on its own line, ``across_joints``, where verdicts refuse it too. Beams do by intent:
+    bricks with a shape and such joints.
     """
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     faceless = [spring.ends for spring in springs if spring.face is None]
     checked, beams = {*map(frozenset, faceless)}, {end for ends in faceless for end in ends}
     solid = [b for b in scene.bricks if b.shape is None or b.name not in beams]
-    thin = {brick.name: min(brick.dimensions) for brick in solid}
+    found = [each for each in BOXES.overlapping(solid) if frozenset(each[:2]) not in checked]
+    boxes = {brick.name: brick for brick in solid if brick.shape is None}
+    for joint in scene.joints if across_joints else ():
+        if joint.face is None and {*joint.bricks} <= {*boxes}:
+            pair = [boxes[name] for name in joint.bricks]
+            depth = _depth_along(pair, joint.position, joint.along)
+            if depth > BOXES.TOLERATED * min(min(brick.dimensions) for brick in pair):
+                found.append((*joint.bricks, depth))
     lines = [
         f"bricks {a} and {b} interpenetrate by {1e3 * depth:.3g} mm; move them apart"
-        for a, b, depth in BOXES.overlapping(solid)
-        if frozenset((a, b)) not in checked or depth > _CORNERS * min(thin[a], thin[b])
+        for a, b, depth in found
     ]
     yield from lines[:_SHOWN]
     if len(lines) > _SHOWN:
         yield f"{len(lines) - _SHOWN} more pairs of bricks interpenetrate"
+
+
+def _depth_along(boxes: Sequence[Brick], point: Vector, axis: Vector) -> float:
+    """Return how long a line through a point is in both boxes, m; negative where they are apart."""
+    first, last = -np.inf, np.inf
+    for box in boxes:
+        at, slope = box.frame @ np.subtract(point, box.position), box.frame @ np.array(axis)
+        slope = np.where(np.abs(slope) < _LEVEL, _LEVEL, slope)  # along a face
+        ends = (np.array([[-0.5], [0.5]]) * box.dimensions - at) / slope
+        first, last = max(first, ends.min(axis=0).max()), min(last, ends.max(axis=0).min())
+    return float(last - first)
 
 
 _HEADER = {"format": "seqopt-scene", "version": 1}

@@ -366,13 +366,18 @@ def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules
 
 
 def _require_buildable(network: Network, rules: FreeRules) -> None:
-    """Raise a `StepError` without robots, or where a brick hangs free once they have let go."""
+    """Raise a `StepError` without robots, or where a brick hangs free once they have let go.
+
+    Props hold on until the last brick of the scene is there.
+    """
     scene, last = network.scene, rules.span(network.scene)[1]
     if not scene.robots:
         raise StepError(f"scene {scene.name}: it has no robots; give at least one")
     if rules.takes_down or rules.how_it_ends is Ending.HELD:
         return
-    for island in islands(network, last)[:1]:
+    on = scene.brick_of_node
+    kept = {on[p.node].name for p in scene.props if last < len(scene.bricks)}
+    for island in [part for part in islands(network, last) if not part & kept][:1]:
         names = ", ".join(map(str, sorted(island)))
         hang = f"bricks {names} hang" if len(island) > 1 else f"brick {names} hangs"
         raise StepError(

@@ -104,7 +104,7 @@ def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, 
     found = dict(of_steps(problem, aim))
     for ask in (by_aims, by_goals):
         found |= {f"{ask.__name__}, {name}": value for name, value in ask(problem, aim)}
-    assert len(found) > 8
+    assert len(found) >= 10
     assert found == pytest.approx(dict.fromkeys(found, found["steps"]), rel=1e-6)
 
 
@@ -233,7 +233,7 @@ def test_a_response_is_one_number_in_all_words(free, aim):
     }
     if not free:
         found |= dict(by_aims(problem, aim))
-    assert len(found) > 4
+    assert len(found) >= 5
     assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
 
 

@@ -125,7 +125,7 @@ BAD = {
     f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }
 NO_ANSWER = {
-    f"{FREE} --payload 20": "grips that give way (--grips 1e6) may do with less",
+    f"{FREE} --payload 20": "grips that give way (--grips 1e6) may do with a smaller payload",
     f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
     f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
     f"{FREE} --stands bond=1e-9 --friction 0.01": "a bond of ",

@@ -13,9 +13,10 @@ import pytest
 import seqopt
 from formulations.times._labels import InTime
 from seqopt.graph._spaces import OrderRules, bisected
-from seqopt.graph.states import CandidateCosts, States
+from seqopt.graph.states import States
 from seqopt.problem import Amount, Filter, requirements
 from seqopt.problem.amounts import BUILT_IN, find_amount, worst
+from seqopt.problem.criteria import CandidateCosts
 from seqopt.sequence._space import FreeSpace, ScheduleSpace
 from tests.brute_force import ONES
 from tests.builders import small_arch

@@ -18,7 +18,7 @@ from seqopt.plan.solve import graph_of
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.sequence.part import without
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.steps import Site
+from seqopt.sequence.steps import Site, StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import small_arch
 
@@ -178,6 +178,16 @@ def test_the_old_rest_goes_on_where_nothing_changed():
     assert compared(rest, rest.steps)["differs"] is None
     first = compared(replace(rest, steps=rest.steps[:-1]), rest.steps)
     assert first["differs"] == rest.steps[-1].number
+
+
+def test_what_is_gone_is_named_where_the_old_rest_cannot_go_on():
+    at = next(step.number for step in PLAN.steps if step.bricks == 2)
+    told = seqopt.replan(PLAN, at, missing=[4]).changes
+    place = next(s.number for s in PLAN.steps if (s.kind, s.bricks) == (StepKind.PLACE, 4))
+    assert told["broken"] == f"step {place}: brick 4 is missing, and comes later"
+    holds = next(s for s in PLAN.steps[at:] if s.grips[2] is not None)
+    told = seqopt.replan(PLAN, at, lost=["rob3"]).changes
+    assert told["broken"] == f"step {holds.number}: rob3 is lost"
 
 
 @pytest.mark.slow

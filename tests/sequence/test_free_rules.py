@@ -1,16 +1,21 @@
 """Rules of the free schedule: what is accepted, and what is said of what is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import seqopt
 from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
+from seqopt.scene.parts import Prop
 from seqopt.sequence._space import free_space
-from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
+from seqopt.sequence.steps import Site, Step, StepKind
+from tests.brute_force import ONES
 from tests.builders import small_arch
 from tests.plain_rules import PlainBook
 from tests.strategies import free_builds
@@ -44,6 +49,24 @@ def test_wrong_rules_get_one_line(rules, said):
 def test_rules_that_do_not_fit_a_scene(rules, said):
     with pytest.raises(StepError, match=said):
         FreeRules(**rules).team(small_arch(4))
+
+
+def test_what_hangs_free_once_robots_let_go_is_named():
+    """A brick without its joint and its ground end; a prop keeps it until the last one comes."""
+    scene = small_arch(4)
+    loose = replace(scene, joints=scene.joints[:-1], grounds=scene.grounds[:1])
+    rules = {k: FreeRules(finish=Site(k, (None,) * len(scene.robots))) for k in (3, 4)}
+    engine = seqopt.make_engine("compliance", loose)
+    with pytest.raises(StepError, match="brick 4 hangs free: no joint leads to the ground"):
+        seqopt.pose(engine, FreeRules(), ONES, "steps")
+    _require_buildable(engine.network, FreeRules(ending="held"))
+    _require_buildable(engine.network, rules[3])  # it is not there yet
+    joints = (scene.joints[0], scene.joints[2])  # brick 3 hangs from brick 4, which is not there
+    part = build_network(replace(scene, joints=joints))
+    with pytest.raises(StepError, match="brick 3 hangs free"):
+        _require_buildable(part, rules[3])
+    node = scene.placed[2].nodes[0]
+    _require_buildable(build_network(part.scene.with_props(Prop(node=node))), rules[3])
 
 
 def test_further_robots_are_mobile():
