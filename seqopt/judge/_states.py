@@ -8,6 +8,7 @@ by its own table of holds, asks the engine of all of them, and counts ranks by i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -44,6 +45,18 @@ def _block(problem: States, bricks: int, grips: Ints) -> Block:
 def _solve(problem: States, bricks: int, grips: Ints) -> Floats:
     """Return the named responses of grip sets (S, r), and then the forces of their grips."""
     return solve_sets(problem.engine, _block(problem, bricks, grips), problem.resources)
+
+
+def _solve_to_round(problem: States, bricks: int, grips: Ints) -> Floats:
+    """Return the same, so that what ranks round them to is certain: six digits where these do."""
+    block = replace(_block(problem, bricks, grips), screen=True, errors=True)
+    rows, errors = np.hsplit(solve_sets(problem.engine, block, problem.resources), 2)
+    units: Any = problem.criterion.settings["resolution"]
+    unit = np.array([units[name[0]] for name in block.names] + [units["F"]] * grips.shape[1])
+    size = np.abs(np.where(np.isfinite(rows), rows, 0.0)) / unit
+    close = (np.abs(size % 1.0 - 0.5) <= errors / unit).any(axis=1)
+    rows[close] = _solve(problem, bricks, grips[close])
+    return rows
 
 
 def _by_name(problem: States, rows: Floats) -> tuple[dict[str, Floats], Floats]:
@@ -401,6 +414,9 @@ class LevelTables:
         others = [k for k, g in enumerate(problem.goals) if g.states and k not in self.columns]
         beside = [*others, *problem.filters, *(e for e in problem.limits if e.response != "F_move")]
         self.is_enough = self.is_needed and not beside and np.isinf(evaluator.most).all()
+        ranks = "resolution" in problem.criterion.settings and not problem.limits
+        ranks &= all(problem.goals[k].of_criterion for k in self.columns)
+        self._solve = _solve_to_round if self.is_enough and ranks else _solve
         engines = tuple(one.engine for one in problem.each or (problem,))
         key = "tables", engines, problem.goals, problem.weights, problem.limits
         self._known: dict[int, _Table] = problem.judged.setdefault(key, {})
@@ -462,8 +478,8 @@ class LevelTables:
         order, bricks, count = np.argsort(numbers, axis=1), choices.bricks, numbers.shape[1]
         grips = np.take_along_axis(numbers, order, axis=1)
         codes = grips @ (1 + self._evaluator.numbers.max()) ** np.arange(count)
-        key = one.engine, bricks, count, tuple(one.named)
-        rows = self.rows.of(key, codes, lambda new: _solve(one, bricks, grips[new]))
+        key = one.engine, bricks, count, tuple(one.named), self._solve
+        rows = self.rows.of(key, codes, lambda new: self._solve(one, bricks, grips[new]))
         found, sorted_forces = _by_name(one, rows)
         forces = np.zeros(grips.shape)
         np.put_along_axis(forces, order, sorted_forces, axis=1)

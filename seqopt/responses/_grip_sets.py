@@ -22,7 +22,7 @@ import numpy as np
 
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, KnownRows
-from seqopt.engines.interface import Engine, NamedEngine, Want, linear_limit
+from seqopt.engines.interface import FLAGS, Engine, Fields, NamedEngine, Want, linear_limit
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine, Extremes
 from seqopt.errors import MechanismError, ProblemError, SceneError
@@ -105,6 +105,13 @@ class Block(FrozenValue):
     screen: bool = True  # whether six digits are enough
     props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
     compiled: bool = False  # whether there is so much to do that loading compiled loops pays
+    errors: bool = False  # whether rows go on with bounds on the errors of all that is in them
+
+    @property
+    def width(self) -> int:
+        """How many columns the answers have."""
+        own = len(self.names) + int(self.grips.shape[1])
+        return 2 * own if self.errors else own
 
     def asked(self) -> tuple[Ints, Want]:
         """Return all grips, those of props last, and the fields from which responses follow."""
@@ -118,6 +125,23 @@ class Block(FrozenValue):
         forces = require_finite("grip force", found.force, self.bricks)[:, : self.grips.shape[1]]
         return np.column_stack([*(EXTREMES[name](found) for name in self.names), forces])
 
+    def with_errors(self, rows: Floats, fields: Fields) -> Floats:
+        """Return rows (S, R + r), and beside them what six digits may be off, as many columns.
+
+        Fields err by a share of the largest entry of each, whatever else they hold.
+        """
+        largest = dict[Want, Floats]()
+        for name, flag in FLAGS.items():
+            flat = getattr(fields, name).reshape(len(rows), -1)
+            most, least = flat.max(axis=1, initial=0.0), flat.min(axis=1, initial=0.0)
+            largest[flag] = np.maximum(most, -least)
+        of_grips = [lengths(fields.grip_force).max(axis=1, initial=0.0)] * self.grips.shape[1]
+        own = [
+            reduce(np.maximum, (most for flag, most in largest.items() if flag & needs))
+            for needs in (CHOSEN_BY[name].needs for name in self.names)
+        ]
+        return np.column_stack([rows, BAND * np.column_stack([*own, *of_grips])])
+
 
 def work(states: int, bricks: int) -> float:
     """Return the estimated work of states, without unit."""
@@ -130,7 +154,8 @@ def answer(engine: Engine, block: Block) -> Floats:
     Raises what the engine does.
     """
     (grips, want), robots = block.asked(), block.grips.shape[1]
-    if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
+    extremes = set(block.names) <= EXTREMES.keys() and not block.errors
+    if isinstance(engine, ComplianceEngine) and extremes:
         with _one_thread():
             return block.rows(engine._extremes(block.bricks, grips, want, compiled=block.compiled))
     with _one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
@@ -145,7 +170,8 @@ def answer(engine: Engine, block: Block) -> Floats:
     if PROP_EXCESS in block.names:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = _excess_of(props, fields.grip_force[:, robots:])
-    return np.column_stack([*(values[name] for name in block.names), forces])
+    rows = np.column_stack([*(values[name] for name in block.names), forces])
+    return block.with_errors(rows, fields) if block.errors else rows
 
 
 def packed(engine: Engine) -> bytes:
@@ -285,7 +311,7 @@ def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floa
             engine.answered += len(part.grips)
             engine.corrected += found[1]
 
-    rows = [np.zeros((0, len(sets.names) + grips.shape[1]))]
+    rows = [np.zeros((0, sets.width))]
     with hire(own.executor, own.workers) as crew:
         task = partial(_answer, engine if crew is None else packed(engine))
         with closing(map_ordered(task, parts, crew, done)) as answers:
@@ -303,7 +329,7 @@ def _answer(engine: Engine | bytes, block: Block) -> tuple[Floats, int]:
     with suppress(MechanismError):
         return answer(engine, block), getattr(engine, "corrected", 0) - before
     if count == 1:
-        return np.full((1, len(block.names) + block.grips.shape[1]), np.inf), 0
+        return np.full((1, block.width), np.inf), 0
     halves = block.grips[: count // 2], block.grips[count // 2 :]
     parts = [_answer(engine, replace(block, grips=half)) for half in halves]
     return np.concatenate([rows for rows, _ in parts]), sum(corrected for _, corrected in parts)
