@@ -73,7 +73,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import InfeasibleError, NothingFoundError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import ROUNDING, Graph, distances, least_sum, strictly_below, tied
 from seqopt.problem.requirements import Resource, StepArrays
@@ -84,6 +84,7 @@ ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a bound to which multipliers are the best
 DEAREST = 1e6  # largest multiplier, over what a path takes per unit of the budget
 LABELS = 20_000  # that are kept at a time at most
+CYCLES = 300  # times that the states of a level are gone through again, where that pays
 NARROW, WIDER = 256, 16  # labels of a level kept at first, and how many times as many then
 CHUNK = 2_000_000  # arcs of labels that are looked at together
 MARGIN = 1e-10  # over a limit: what is pruned is beyond it however sums are rounded
@@ -564,15 +565,21 @@ class Sweep:
     def run(self, watch: Watch, most: int = 0) -> Swept:
         """Return the best path and labels; ``most``: labels that may be kept, 0 for any number.
 
-        Raises `LateError` if there are more, or time is over.
+        Raises `LateError` if there are more, or time is over; `ProblemError` if cycles of arcs pay
+        without end.
         """
         growth, found, count, best = self._growth, self._found, 0, -1
         zero = np.zeros(1, dtype=np.int64)
         start = self._within(Labels(zero, growth.first, zero - 1, zero - 1))
         pending: dict[int, list[Labels]] = {int(growth.levels[0]): [start]}
-        for level in range(int(growth.levels.max()) + 1):
+        for level, states in enumerate(np.bincount(growth.levels).tolist()):
             here: list[Labels] = []
             while level in pending:
+                if len(here) > states + CYCLES:
+                    raise ProblemError(
+                        "a resource falls whenever the same steps are repeated, so that no search "
+                        "for the best path ends; let it fall to a least value at most"
+                    )
                 met = self._narrowed(_joined(pending.pop(level)), 4)
                 fresh = self._narrowed(_undominated(met, here, growth), 1)
                 here.append(fresh)

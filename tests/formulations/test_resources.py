@@ -239,3 +239,13 @@ def test_labels_that_are_left_out_of_a_proof_are_missed():
 
     with pytest.raises(SeqoptError, match="labels do not prove"):
         seqopt.solve(problem, replace(known, solve=fewer))
+
+
+def test_one_that_falls_without_end_is_refused_and_one_with_an_end_is_not(monkeypatch):
+    monkeypatch.setattr("seqopt.graph._budgets.CYCLES", 20)
+    endless = Resource("rest", (0.0,), lambda _, values: values - 1.0)
+    with pytest.raises(ProblemError, match="falls whenever the same steps are repeated"):
+        seqopt.solve(posed("free").but(limits=[endless]))
+    ended = Resource("rest", (0.0,), lambda _, values: np.maximum(values - 1.0, -3.0))
+    plan = seqopt.solve(posed("free").but(limits=[ended]))
+    assert plan.objective == seqopt.solve(posed("free")).objective
