@@ -15,7 +15,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError
-from seqopt.instances._files import WRITERS, save_instance
+from seqopt.instances._files import WRITTEN, save_instance
 from seqopt.instances.compiled import instance
 from seqopt.instances.model import Instance
 from seqopt.work import Tell
@@ -49,8 +49,8 @@ def run(
     $ seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
     """
     words = asked.words
-    if out and out.suffix not in ("", *WRITERS):
-        raise ProblemError(f"--out {out}: give a name with {', '.join(WRITERS)}, or a folder")
+    if out and out.suffix not in ("", *WRITTEN):
+        raise ProblemError(f"--out {out}: give a name with {', '.join(WRITTEN)}, or a folder")
     mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=True)
     found: Instance = asked(mortar=mortar, progress=progress)
     to = out or Path(re.sub(r"\W+", "-", found.name).strip("-") + ".npz")

@@ -10,7 +10,7 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.signatures import Call
 from seqopt.errors import SolverError
 from seqopt.instances._files import read_instance
-from seqopt.instances.answers import judge_instance
+from seqopt.instances._judge import judge_instance
 from seqopt.instances.model import Instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
