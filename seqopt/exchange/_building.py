@@ -99,7 +99,10 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     named = {block.key: i for i, block in enumerate(content.blocks)}
     marked = [block.key for block in content.blocks if block.support]
-    keys = marked if given.supports is None else rows("supports", given.supports, "keys of blocks")
+    if isinstance(given.supports, str):
+        keys = tuple(key.strip() for key in given.supports.split(",") if key.strip())
+    else:
+        keys = rows("supports", marked if given.supports is None else given.supports, "keys")
     for key in keys:
         if not isinstance(key, str) or key not in named:
             known = short(", ".join(named), 200)

@@ -125,6 +125,14 @@ class BuildProver:
         """How many verdicts were asked, by state and mortar, and how many were proven for them."""
         return {"verdicts": sum(map(len, self._known.values())), "proven": self.proven}
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Why verdicts are missing, and which effects they neglect, in words."""
+        said = [f"not proven; {self.refusal}"] if self.refusal else []
+        if self.mortars and (moves := _settlement_said(self.network.scene)):
+            said.append(moves)
+        return tuple(f"stability: {each}" for each in said)
+
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
     ) -> dict[str, tuple[BuildVerdicts, ...]]:

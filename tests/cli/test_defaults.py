@@ -213,20 +213,6 @@ def test_props_are_said_in_words(capsys, tmp_path):
     assert {prop.stiffness for prop in props} == {(1e5,) * 3}
 
 
-def test_an_older_word_does_as_before_and_says_the_new_one(capsys):
-    scene = "chain:bricks=6"
-    words = ("optimize", scene, "--schedule", "free", "--json", "--no-stability")
-    for older in (("--criteria", "weighted"), ("--criteria=weighted",)):
-        status, out, err = command(capsys, *words, *older)
-        assert (status, err.splitlines()[0]) == (0, "seqopt: --criteria is called --criterion now")
-        assert json.loads(out)["summary"]["criterion"].startswith("weighted")
-    _, new, err = command(capsys, *words, "--criterion", "weighted")
-    assert "is called" not in err
-    assert json.loads(new)["summary"]["objective"] == json.loads(out)["summary"]["objective"]
-    quiet = (*words, "--criteria", "weighted", "--quiet")
-    assert "is called" not in command(capsys, *quiet)[2]
-
-
 def test_a_pareto_set_takes_a_criterion_as_others_do(capsys):
     scene, aim, ends = "chain:bricks=6", "minmax,steps", set()
     for name in ("worst-ratio-published", "weighted"):
