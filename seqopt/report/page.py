@@ -58,11 +58,9 @@ class Build:
 
     ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
     ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
-    responses; ``order`` names the bricks as they are placed, where that is not the scene's own
-    order; ``arms``: the joints of
-    robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
-    entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
-    steps arms cannot be, in words.
+    responses; ``order`` names the bricks as they are placed, where that is not the scene's own;
+    ``arms``: of robots whose postures are known, by name (of others a simple arm is drawn);
+    ``faults``: in which steps arms cannot be, in words.
     """
 
     name: str

@@ -22,9 +22,9 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.network.network import build_network
 from seqopt.report import _robots, page
+from seqopt.report._notebook import _viewer_class
 from seqopt.report._pages import OVER, plan_page
 from seqopt.report._robots import Cell, arm_data
-from seqopt.report._widget import _viewer_class
 from seqopt.report.page import LARGEST, Build, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
