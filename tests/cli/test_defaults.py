@@ -171,15 +171,6 @@ def test_all_built_in_scenes_are_listed_a_line_each(capsys):
         assert line.endswith(ABOUT[name])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", builtin_scenes())
-def test_a_built_in_scene_is_exported_and_read_again(capsys, tmp_path, name):
-    path = tmp_path / "scene.json"
-    out = command(capsys, "scene", name, "--export", path)[1]
-    assert f"{name}: {len(load_scene(name).bricks)} bricks" in out
-    assert load_scene(path) == load_scene(name)
-
-
 def test_a_stiffness_is_that_of_all_robots(tmp_path, capsys):
     path = tmp_path / "soft.json"
     words = ("scene", "arch25", "--grips", "1e6x1e6x5e5,turning=2e4", "--export", path)
