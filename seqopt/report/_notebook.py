@@ -92,9 +92,8 @@ def _viewer_class() -> type[Any]:
         raise ExtraError(
             "widgets need anywidget, which is not installed: pip install 'seqopt[notebook]'"
         ) from None
-    script = resources.files("seqopt") / "data/viewer/widget.mjs"
     traits = {
-        "_esm": script.read_text(encoding="utf-8"),
+        "_esm": (resources.files("seqopt") / "data/viewer/widget.mjs").read_text(encoding="utf-8"),
         "page": Unicode(read_only=True).tag(sync=True),
         "height": Int(900, min=100).tag(sync=True),
         "step": Int(0, min=0, help="from 1; 0: the one that decides").tag(sync=True),

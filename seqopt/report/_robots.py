@@ -54,8 +54,8 @@ class Cell:
         self.middle = self._on_ground(0.5 * (low + high))
         first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
         self._sides = np.stack([first, np.cross(self.up, first)])  # level directions (2, 3)
-        every = [arm for own in (arms or {}).values() for arm in own if arm is not None]
-        self._known = [*{id(arm): arm for arm in every}.values()]
+        every = (arm for own in (arms or {}).values() for arm in own)
+        self._known = [*{id(arm): arm for arm in every if arm is not None}.values()]
 
     @cached_property
     def stands(self) -> Floats:

@@ -289,14 +289,13 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
     """Return the viewer's data of builds, with fields of as many as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
-    network = engine.network
-    cell = Cell(network.scene)
+    network, cell = engine.network, Cell(engine.network.scene)
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
     states = _distinct(build.steps for build in compress(builds, drawn))
     known = dict(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
-    why = "they place bricks in another order than the scene" if len(drawn) > sum(drawn) else ""
+    why = "" if all(drawn) else "they place bricks in another order than the scene"
     why = "there are too many steps" if ends[-1] > MOST else why
     return {
         "structure": _structure_data(network, cell),
