@@ -102,7 +102,8 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     if isinstance(given.supports, str):
         keys = tuple(key.strip() for key in given.supports.split(",") if key.strip())
     else:
-        keys = rows("supports", marked if given.supports is None else given.supports, "keys")
+        wanted = marked if given.supports is None else given.supports
+        keys = rows("supports", wanted, "keys of blocks")
     for key in keys:
         if not isinstance(key, str) or key not in named:
             known = short(", ".join(named), 200)
