@@ -9,7 +9,7 @@ from seqopt.graph.formulation import Formulation as Formulation
 from seqopt.graph.formulation import formulations as formulations
 from seqopt.instances._files import read_instance as read_instance
 from seqopt.instances._files import save_instance as save_instance
-from seqopt.instances.answers import judge_instance as judge_instance
+from seqopt.instances._judge import judge_instance as judge_instance
 from seqopt.instances.compiled import compile_instance as compile_instance
 from seqopt.network.network import Network as Network
 from seqopt.network.network import build_network as build_network

@@ -63,7 +63,7 @@ VIEWS = {
     "ShownBuild.export": "seqopt.exchange.exports:export",
     "Plan.replan": "seqopt.questions:replan",
     "ShownBuild.report": "seqopt.report._pages:build_page",
-    "Page.widget": "seqopt.report._widget:step_viewer",
+    "Page.widget": "seqopt.report._notebook:step_viewer",
     "FailureMap.plot": "seqopt.report.charts:failure_figure",
     "RegretTable.plot": "seqopt.report._regret._chart:regret_chart",
 }

@@ -31,7 +31,6 @@ EXAMPLES = """Three examples:
 
 seqopt --help names all commands, seqopt COMMAND --help what each can do.
 """
-RENAMED = {"--criteria": "--criterion"}  # older words for options, which still do
 SIGNATURES = Later("seqopt._cli.signatures")  # 240 ms: it needs all that is computed
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
@@ -152,17 +151,7 @@ class Request:
 
 
 def request(words: Sequence[str]) -> Request:
-    """Parse words into a command and its options; a wrong word ends the program.
-
-    An older word for an option is said, unless words ask for quiet.
-    """
-    words = [*words]
-    for at, word in enumerate(words):
-        flag, sign, value = word.partition("=")
-        if flag in RENAMED:
-            words[at] = f"{RENAMED[flag]}{sign}{value}"
-            if "--quiet" not in words:
-                complain(f"seqopt: {flag} is called {RENAMED[flag]} now")
+    """Parse words into a command and its options; a wrong word ends the program."""
     helps = any(word.startswith(("-h", "--h")) for word in words)  # argparse takes it shortened
     values = vars(parser(named_command(words), helps=helps).parse_args(words))
     name = values.pop("command")

@@ -49,23 +49,23 @@ class Command(Part):
 
 
 COMMANDS = {
-    name: Command(name, f"seqopt._cli.commands.{home}:run", about)
+    name: Command(name, f"seqopt._cli.commands.{home}", about)
     for name, home, about in (
-        ("compare", "compare", "show all ways to build a scene side by side"),
-        ("optimize", "optimize", "choose where robots hold, and write the plan"),
-        ("replan", "replan", "plan the rest of a build after a change"),
-        ("pareto", "pareto", "find all plans that no other one beats in every aim"),
-        ("sweep", "sweep", "plan many problems, a row of a table for each"),
-        ("analyze", "analyze", "compute forces and displacements in every step"),
-        ("times", "times", "say how long a build takes, and who does what when"),
-        ("assess", "assess", "prove which steps stand, and with what margins"),
-        ("report", "report", "make a page that shows plans step by step"),
-        ("reach", "reach", "say who reaches which nodes, and how"),
-        ("scene", "scene", "check, describe, export or list scenes"),
-        ("import", "importing", "make a scene of an assembly of COMPAS, a mesh or a table"),
-        ("export", "exporting", "write a plan in a format of others"),
-        ("instance", "instance", "write the graph of a problem, for any solver"),
-        ("judge", "judge", "check a bare solution of an instance, and a bound"),
+        ("compare", "compare:run", "show all ways to build a scene side by side"),
+        ("optimize", "optimize:run", "choose where robots hold, and write the plan"),
+        ("replan", "replan:run", "plan the rest of a build after a change"),
+        ("pareto", "pareto:run", "find all plans that no other one beats in every aim"),
+        ("sweep", "sweep:run", "plan many problems, a row of a table for each"),
+        ("analyze", "analyze:run", "compute forces and displacements in every step"),
+        ("times", "times:run", "say how long a build takes, and who does what when"),
+        ("assess", "assess:run", "prove which steps stand, and with what margins"),
+        ("report", "report:run", "make a page that shows plans step by step"),
+        ("reach", "reach:run", "say who reaches which nodes, and how"),
+        ("scene", "scene:run", "check, describe, export or list scenes"),
+        ("import", "exchange:read", "make a scene of an assembly of COMPAS, a mesh or a table"),
+        ("export", "exchange:write", "write a plan in a format of others"),
+        ("instance", "instances:write", "write the graph of a problem, for any solver"),
+        ("judge", "instances:judge", "check a bare solution of an instance, and a bound"),
     )
 }
 """The commands that are always there, by name."""

@@ -2,57 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.engines.interface import Engine
-from seqopt.engines.registry import REASONS, USUAL, AutoEngine, _chooser_of
-from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
-from seqopt.stability.failure_map import BuildProver, BuildVerdicts, _settlement_said
-
-
-def size_line(scene: Scene) -> str:
-    """Describe name and size of a scene."""
-    size = f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
-    return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
-
-
-def level_notes(named: str | None, engine: Engine) -> tuple[str, ...]:
-    """Describe the levels an ``auto`` engine took, and why; of one not named only discrete."""
-    if _chooser_of(engine) is not None:
-        return (f"engine: {USUAL}: {REASONS[USUAL]}",) if named else ()
-    if not isinstance(engine, AutoEngine):
-        return ()
-    said = [
-        f"engine: {level} for {sets} grip sets: {REASONS[level]}"
-        for level, sets in engine.tally.items()
-        if named or level == "discrete"
-    ]
-    return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
+from seqopt.stability.failure_map import BuildVerdicts
 
 
 def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
     """Describe the payloads, and capacities of props, that steps exceed."""
     found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)
-
-
-def waits_said(build: ShownBuild) -> Iterator[str]:
-    """Yield the total wait for mortar of a judged build."""
-    if build.standing is None or build.standing.curing is None:
-        return
-    table = build.times()
-    waits = table[table["cures_s"] > 0]
-    steps, total = f"{len(waits)} step{'s' * (len(waits) > 1)}", waits["cures_s"].sum()
-    said = f"{total:.6g} s are waits for mortar, in {steps}"
-    yield said if len(waits) else "no step waits for mortar"
-    yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
 def spent_said(
@@ -78,14 +43,6 @@ def spent_said(
         shown = f"{showing['verdicts']:,} verdicts shown, {showing['proven']:,} proven for them"
         parts += [shown, f"{showing['pictures']:,} pictures"]
     return f"spent: {'; '.join(parts)}"
-
-
-def refused(prover: BuildProver) -> tuple[str, ...]:
-    """Return notes on missing verdicts, and on effects that they neglect."""
-    said = [f"not proven; {prover.refusal}"] if prover.refusal else []
-    if prover.mortars and (moves := _settlement_said(prover.network.scene)):
-        said.append(moves)
-    return tuple(f"stability: {each}" for each in said)
 
 
 def marked(

@@ -7,12 +7,10 @@ meaning in all commands.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from math import radians
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
-from seqopt.contact.mortar import _find_curing, _with_friction, find_mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import formulation_names
@@ -21,7 +19,7 @@ from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.part import Part, find_scene
 from seqopt.stability.assessment import MARGINS
-from seqopt.stability.standing import Standing
+from seqopt.stability.standing import find_standing
 from seqopt.study import CRITERIA, PUBLISHED
 from seqopt.workflow import Robust, Search
 
@@ -42,7 +40,7 @@ QUESTIONS = {
     "workers max_memory",
     "How are responses computed?": "engine mortar tolerance cache",
     "What does the file not say?": "unit up density supports",
-    "Which joints are made?": "stiffness gap accept_overlaps",
+    "Which joints are made?": "law gap accept_overlaps",
     "What is written and printed?": "out name below figures stability details quiet json",
 }
 """Options by the question that they answer, in the order in which help asks them."""
@@ -51,6 +49,7 @@ FLAGS = {
     "bounds": "bound",
     "budgets": "budget",
     "count": "scenarios",
+    "law": "stiffness",
     "limits": "limit",
     "measure": "robust",
     "options": "option",
@@ -92,7 +91,7 @@ HOW: dict[str, dict[str, Any]] = {
     "formulation": {"names": formulation_names},
     "margins": {"names": lambda: MARGINS},
 }  # what a parser knows of options beside their types; names are what help lists
-HIDDEN = ("executor", "law", "made_by", "prover", "scenes")  # that Python alone says
+HIDDEN = ("executor", "made_by", "prover", "scenes")  # that Python alone says
 
 
 def named(text: str) -> tuple[str, ...]:
@@ -120,48 +119,11 @@ def given_steps(
     return plan or method
 
 
-def demanded(
-    *,
-    stands: str | None = None,
-    friction: float | None = None,
-    tilt: float | None = None,
-    curing: Sequence[str] = (),
-) -> Standing | None:
-    """Return the demand that every state stands, None if there is none.
-
-    Parameters
-    ----------
-    stands : str
-        Every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH
-        (Pa).
-    friction : float
-        With ``stands``: coefficient of friction.
-    tilt : float
-        With ``stands``: tilt that every state must survive.
-    curing : sequence of str
-        With ``stands``: which share of its bond mortar has at an age: 15min (in proportion, full
-        then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never.
-        What is let go waits for it (default: full at once).
-    """
-    said = {"tilt": tilt, "friction": friction, "curing": curing}
-    names = [name for name, value in said.items() if value not in (None, ())]
-    if stands is None:
-        if names:
-            usual = "epoxy" if names[0] == "curing" else "dry"
-            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {usual}, say")
-        return None
-    mortar = _with_friction(find_mortar(stands, "stands"), friction)
-    if tilt is not None and not tilt < 90:
-        raise ProblemError(f"--tilt {tilt:g}: give an angle from 0 to below 90 degrees")
-    cures = _find_curing(" ".join(curing)) if curing else None
-    return Standing(mortar, radians(tilt or 0.0), cures)
-
-
 SPREAD: dict[str, Callable[..., Any]] = {
     "scene": find_scene,
     "schedule": Part,
     "steps": given_steps,
-    "stands": demanded,
+    "stands": find_standing,
     "robust": Robust,
     "search": Search,
 }

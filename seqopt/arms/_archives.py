@@ -14,6 +14,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError
 
 _LARGEST = 256_000_000  # bytes of all parts unpacked: 16 million arcs with one amount
@@ -103,4 +104,20 @@ class Archive:
                 f"{self._where}: {name} has shape {found.shape} of {found.dtype}; "
                 f"{said} of kind {' or '.join(kinds)} belongs there"
             )
+        return found
+
+    def indices(self, name: str, shape: tuple[int | None, ...], least: int, end: int) -> Ints:
+        """Return an array of integers from one bound on and below another; else as `array`."""
+        found = self.array(name, "iu", shape)
+        if found.size and not least <= int(found.min()) <= int(found.max()) < end:
+            worst = int(found.min() if int(found.min()) < least else found.max())
+            raise FileError(f"{self._where}: {name}: {worst} is not from {least} to {end - 1}")
+        return found.astype(np.int64)
+
+    def numbers(self, name: str, shape: tuple[int | None, ...], least: float = -np.inf) -> Floats:
+        """Return an array of finite numbers, none below a bound; else as `array`."""
+        found = self.array(name, "iuf", shape).astype(float)
+        if not (np.isfinite(found) & (found >= least)).all():
+            said = "" if np.isinf(least) else f" from {least:g}"
+            raise FileError(f"{self._where}: {name}: give finite numbers{said}")
         return found

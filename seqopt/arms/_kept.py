@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,13 +20,14 @@ import numpy as np
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse
 from seqopt.engines.registry import engine_for, recipe_of
-from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
+from seqopt.errors import ExtraError, NothingFoundError, ProblemError, SceneError, TimeUpError
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
+from seqopt.work import Tell
 
 if TYPE_CHECKING:
     from seqopt.arms._tables import PostureTable
@@ -259,3 +261,12 @@ def _with_fewer(problem: Problem, plan: Plan, postures: int) -> Problem:
 
 def _up_to(count: int) -> str:
     return f"up to {count} postures" if count > 1 else "one posture"
+
+
+def posture_trouble(scene: Scene, cache: Path | None, tell: Tell) -> str:
+    """Compute or load postures of arms; return the error message if there are none."""
+    try:
+        find_postures(scene, cache, tell)
+    except (ExtraError, SceneError) as error:
+        return str(error)
+    return ""

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -221,6 +221,23 @@ def reach_described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
         if len(early):
             pairs = zip(early["node"], early["to_bricks"], strict=True)
             yield f"  up to fewer bricks: {_listed([f'{n} ({to})' for n, to in pairs])}"
+
+
+def reached_by_region(scene: Scene) -> tuple[pd.DataFrame, list[str]]:
+    """Return the nodes that robots without arms reach, a row each, and a line for each robot."""
+    rows, lines = list[dict[str, Any]](), list[str]()
+    barred = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
+    free = [node for node in scene.placed_nodes if node not in barred]
+    for robot in (each for each in scene.robots if each.arm is None):
+        pairs = zip(scene.placed, scene.within_reach(robot), strict=True)
+        nodes = [(brick.name, node) for brick, own in pairs for node in own]
+        rows += [{"robot": robot.name, "brick": brick, "node": node} for brick, node in nodes]
+        able = {node for _, node in nodes}
+        lines.append(f"{robot.name}: reaches {len(able)} of {len(free)} nodes ({robot.reach})")
+        if able and len(able) < len(free):
+            lines.append(f"  reached: {_listed([str(n) for n in free if n in able])}")
+            lines.append(f"  never: {_listed([str(n) for n in free if n not in able])}")
+    return pd.DataFrame(rows, columns=["robot", "brick", "node"]), lines
 
 
 def _listed(names: list[str], most: int = 30) -> str:

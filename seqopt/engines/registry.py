@@ -294,3 +294,17 @@ def versions() -> Mapping[str, str]:
         except PackageNotFoundError:
             known[name] = "not installed"
     return known
+
+
+def level_notes(named: str | None, engine: Engine) -> tuple[str, ...]:
+    """Describe the levels an ``auto`` engine took, and why; of one not named only discrete."""
+    if _chooser_of(engine) is not None:
+        return (f"engine: {USUAL}: {REASONS[USUAL]}",) if named else ()
+    if not isinstance(engine, AutoEngine):
+        return ()
+    said = [
+        f"engine: {level} for {sets} grip sets: {REASONS[level]}"
+        for level, sets in engine.tally.items()
+        if named or level == "discrete"
+    ]
+    return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))

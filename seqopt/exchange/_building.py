@@ -99,7 +99,11 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     named = {block.key: i for i, block in enumerate(content.blocks)}
     marked = [block.key for block in content.blocks if block.support]
-    keys = marked if given.supports is None else rows("supports", given.supports, "keys of blocks")
+    if isinstance(given.supports, str):
+        keys = tuple(key.strip() for key in given.supports.split(",") if key.strip())
+    else:
+        wanted = marked if given.supports is None else given.supports
+        keys = rows("supports", wanted, "keys of blocks")
     for key in keys:
         if not isinstance(key, str) or key not in named:
             known = short(", ".join(named), 200)

@@ -10,7 +10,8 @@ import numpy as np
 
 from seqopt._files import parse_json
 from seqopt.arrays import Floats
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
+from seqopt.problem.requirements import number_word
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.library.common import JointLaw
 from seqopt.work import Tell
@@ -79,6 +80,15 @@ class Content:
         return replace(self, blocks=tuple(blocks))
 
 
+def _law(text: str) -> JointLaw:
+    """Return a joint law from a text: its stiffness along the normal, and across it."""
+    pair, where = text.split(","), f"--stiffness {text}"
+    if len(pair) != 2:
+        raise ProblemError(f"{where}: give two numbers, as 1.5e9,1.5e8")
+    along, across = (number_word(number, where) for number in pair)
+    return JointLaw(translational=(along, across, across))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Given:
     """What the user adds if a file does not say it.
@@ -91,10 +101,11 @@ class Given:
         Axis of the file that points up, ``z`` or ``y``; by default ``z``.
     density : float, optional
         Of blocks for which the file has none, kg/m³.
-    supports : sequence of str, optional
-        Keys of blocks that are fixed; by default the file's.
+    supports : sequence of str or str, optional
+        Blocks that are the ground, by their keys in the file (default: those that it marks,
+        else what stands at the lowest level).
     law : JointLaw, optional
-        Stiffness of joints by area; by default `seqopt.scene.library.common.MASONRY`.
+        Of joints by area, N/m³ (default: 1.5e9,1.5e8).
     gap : float, optional
         Most that may lie between faces that touch, m (default: a twentieth of the thinnest block).
     accept_overlaps : bool, optional
@@ -110,8 +121,8 @@ class Given:
     unit: Annotated[str | None, ("choices", UNITS)] = None
     up: Annotated[str | None, ("choices", UPS)] = None
     density: Annotated[float | None, ("value", "KG/M3")] = None
-    supports: Sequence[str] | None = None
-    law: JointLaw | None = None
+    supports: Annotated[Sequence[str] | str | None, ("value", "KEY,KEY")] = None
+    law: Annotated[JointLaw | None, ("value", "NORMAL,TANGENTIAL"), ("parse", _law)] = None
     gap: Annotated[float | None, ("value", "M")] = None
     accept_overlaps: bool = False
     robots: Annotated[int | None, ("value", "N"), ("most", 100)] = None

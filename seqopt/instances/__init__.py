@@ -17,7 +17,7 @@ from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.instances._files import read_instance, save_instance
-    from seqopt.instances.answers import judge_instance
+    from seqopt.instances._judge import judge_instance
     from seqopt.instances.compiled import compile_instance, instance
     from seqopt.instances.model import Instance
 
@@ -35,7 +35,7 @@ __getattr__, __dir__ = later(
         "Instance": "model",
         "compile_instance": "compiled",
         "instance": "compiled",
-        "judge_instance": "answers",
+        "judge_instance": "_judge",
         "read_instance": "_files",
         "save_instance": "_files",
     },

@@ -16,7 +16,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, Run, Solution, Watch, timed
 from seqopt.graph.graph import PEAK, SUM, TAIL, TIME, least_sum
-from seqopt.instances._judge import Answer, Claim, OverCapError, judge_path
+from seqopt.instances._judge import Claim, OverCapError, judge_path
 from seqopt.instances.model import Instance, _Cap
 from seqopt.judge.arithmetic import _is_kept, least_within
 from seqopt.judge.certificate import TOLERANCE, Certificate
@@ -118,9 +118,8 @@ def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: 
 def judged(instance: Instance, formulation: Formulation, found: Solution) -> Certificate:
     """Return the certificate of a path from the multipliers and labels of its formulation."""
     nodes = np.array([state[0] for state in found.states])
-    answer = Answer("nodes", nodes, found.objective, tuple(_claims(instance, found)))
     try:
-        proof: Certificate = judge_path(instance, answer)
+        proof = judge_path(instance, "nodes", nodes, found.objective, _claims(instance, found))
     except OverCapError as error:
         raise SolverError(f"{error}; use a formulation that keeps budgets exactly") from None
     exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped

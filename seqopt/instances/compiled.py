@@ -30,7 +30,6 @@ from seqopt.sequence.part import Part
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
-from seqopt.times._graph import TimedGraph
 from seqopt.work import Clock, Tell
 from seqopt.workflow import Robust, Search, pose_build
 
@@ -147,11 +146,42 @@ def compile_instance(
 
 
 def _of_states(name: str, states: States, below: float) -> Instance:
-    """Return the instance of a graph of states."""
+    """Return the instance of a graph of states.
+
+    Where robots have names its arcs are decisions, with the forced steps behind them.
+    """
+    visited, rows = _explored(name, states, below)
+    graph, timed = visited.graph, None
+    names, goals, caps = _targets(states, len(graph.peaks))
+    if states.rules.names_robots() and not states.is_timed:
+        if not states.totals and states.goals[0].of_criterion:
+            own = [states.candidates.charges(level, each) for level, _, each in visited.states]
+            graph = replace(graph, alone=np.concatenate(own)[graph.target])
+        short = contracted(graph.only(_on_paths(graph)))
+        small, rows = short.graph, rows[short.kept]
+        rows[:, 0] = np.unique(rows[:, 0], return_inverse=True)[1]  # levels of decisions
+    else:
+        if states.is_timed:
+            timed = offered("timed_graph")(states, visited)
+            every = [k for k, goal in enumerate(states.goals) if not goal.in_time]
+            peaks = tuple(graph.peaks[k] for k in every)
+            graph = replace(graph, amounts=graph.amounts[:, every], peaks=peaks)
+        small, kept = _pruned(graph)
+        rows = rows[kept]
+        if timed is not None:
+            timed = timed.only(kept, _by_goal(small, (goals, caps)))
+    arrays = small.source, small.target, small.ends, names, small.amounts
+    return Instance(name, *arrays, goals, caps, rows, timed, small.alone)
+
+
+def _explored(name: str, states: States, below: float) -> tuple[Visited, Ints]:
+    """Return the states and moves that a plan may take, and what the states stand for."""
     if below < np.inf and (states.totals or not states.goals[0].is_peak):
         raise ProblemError("below: the first aim is no worst step; leave it out")
     if states.paths:
         raise ProblemError(f"instance: no resource is in it; leave {states.paths[0]} out")
+    if states.is_timed and states.standing is not None and states.standing.curing is not None:
+        raise ProblemError("instance: how mortar cures is not in it; leave curing out")
     demanded = bool(states.demands) or any(goal.margins for goal in states.goals)
     space = build_space(states, standing=demanded)
     found = Explorer(space)
@@ -160,39 +190,7 @@ def _of_states(name: str, states: States, below: float) -> Instance:
         raise InfeasibleError(f"instance {name}: no plan is allowed")
     found.refine()
     visited = found.graph()
-    if states.totals:
-        count = len(visited.graph.peaks)
-        tail = _Target(str(states.over), TAIL, tuple(range(count)), states.over.most(count))
-        asked: Any = [f"cost {k}" for k in range(count)], (tail,), ()
-    else:
-        asked = _targets(states)
-    rows = np.concatenate([space.rows(key, own) for _, key, own in visited.states])
-    timed = None
-    whole = visited.graph
-    if states.rules.names_robots() and not states.is_timed:
-        return _of_decisions(name, states, visited, rows, asked)
-    if states.is_timed:
-        if states.standing is not None and states.standing.curing is not None:
-            raise ProblemError("instance: how mortar cures is not in it; leave curing out")
-        timed = offered("timed_graph")(states, visited)
-        every = [k for k, goal in enumerate(states.goals) if not goal.in_time]
-        peaks = tuple(whole.peaks[k] for k in every)
-        whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
-    small, kept = _pruned(whole)
-    names, goals, caps = asked
-    if timed is not None:  # of the nodes that are kept
-        on = np.isin(np.arange(whole.states), kept)
-        arcs = on[whole.source] & on[whole.target]
-        acts = arcs[timed.move]
-        timed = TimedGraph(
-            _by_goal(small, (goals, caps)),
-            *(timed.levels[on], timed.free[on], timed.alike[on], timed.kinds),
-            (np.cumsum(arcs) - 1)[timed.move[acts]],
-            *(timed.column[acts], timed.origin[acts]),
-            *(timed.prepares[arcs], timed.acts[arcs], timed.work[arcs], timed.longest),
-        )
-    arrays = small.source, small.target, small.ends
-    return Instance(name, *arrays, tuple(names), small.amounts, goals, caps, rows[kept], timed)
+    return visited, np.concatenate([space.rows(key, own) for _, key, own in visited.states])
 
 
 def _pruned(graph: Graph) -> tuple[Graph, Ints]:
@@ -200,37 +198,26 @@ def _pruned(graph: Graph) -> tuple[Graph, Ints]:
     small = graph.only(_on_paths(graph))
     if not len(small.source):
         raise InfeasibleError("no path leads to an end")
-    on = np.isin(np.arange(graph.states), [small.source, small.target])
-    number = (np.cumsum(on) - 1).astype(np.int32)
-    rows = number[small.source], number[small.target]
-    return replace(small, source=rows[0], target=rows[1], ends=graph.ends[on]), np.flatnonzero(on)
+    kept, rows = np.unique([small.source, small.target], return_inverse=True)
+    source, target = rows.reshape(2, -1).astype(np.int32)
+    return replace(small, source=source, target=target, ends=graph.ends[kept]), kept
 
 
-def _of_decisions(name: str, states: States, visited: Visited, rows: Ints, asked: Any) -> Instance:
-    """Return the instance whose arcs are decisions, with the forced steps behind them."""
-    graph, (names, goals, caps) = visited.graph, asked
-    if not states.totals and states.goals[0].of_criterion:
-        own = [states.candidates.charges(level, each) for level, _, each in visited.states]
-        graph = replace(graph, alone=np.concatenate(own)[graph.target])
-    short = contracted(graph.only(_on_paths(graph)))
-    rows, small = rows[short.kept], short.graph
-    rows[:, 0] = np.unique(rows[:, 0], return_inverse=True)[1]  # levels of decisions
-    arrays = small.source, small.target, small.ends, tuple(names), small.amounts
-    return Instance(name, *arrays, goals, caps, rows, alone=small.alone)
-
-
-def _targets(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
-    """Return the names of columns, goals and caps of a problem of states."""
+def _targets(
+    states: States, count: int
+) -> tuple[tuple[str, ...], tuple[_Target, ...], tuple[_Cap, ...]]:
+    """Return the names of columns, ``count``, goals and caps of a problem of states."""
+    if states.totals:
+        tail = _Target(str(states.over), TAIL, tuple(range(count)), states.over.most(count))
+        return tuple(f"cost {k}" for k in range(count)), (tail,), ()
     names, goals, caps = list[str](), list[_Target](), list[_Cap]()
     bounds = (*[None] * len(states.aims), *states.budgets)
     for goal, bound in zip(states.goals, bounds, strict=True):
-        is_time = goal.in_time
-        column = None if is_time else len(names)
-        if not is_time:
-            names.append(str(goal))
-        if bound is None:
-            kind = TIME if is_time else PEAK if goal.is_peak else SUM
-            goals.append(_Target(str(goal), kind, () if column is None else (column,)))
-        else:
-            caps.append(_Cap(str(goal), column, bound))
-    return names, tuple(goals), tuple(caps)
+        name, column = str(goal), None if goal.in_time else len(names)
+        names += [] if goal.in_time else [name]
+        if bound is not None:
+            caps.append(_Cap(name, column, bound))
+            continue
+        kind = TIME if goal.in_time else PEAK if goal.is_peak else SUM
+        goals.append(_Target(name, kind, () if column is None else (column,)))
+    return tuple(names), tuple(goals), tuple(caps)

@@ -41,8 +41,7 @@ def figure_notes() -> tuple[str, ...]:
 
 def picture_files(name: str, draw: Callable[[Any], Any]) -> Mapping[str, bytes]:
     """Return files of a picture, none without matplotlib; ``draw`` takes the charts."""
-    found: Mapping[str, bytes] = {}
-    return found if figure_notes() else STYLE.picture_files(name, draw(CHARTS))
+    return {} if figure_notes() else STYLE.picture_files(name, draw(CHARTS))
 
 
 def plan_files(plan: Plan) -> Files:
@@ -88,8 +87,8 @@ def plan_pages(
 
 def front_counts(front: Front) -> dict[str, object]:
     """Return number of points, completeness, and run times."""
-    counts = {"points": len(front.steps), "complete": front.complete}
-    return {**counts, "seconds": dict(front.seconds)}
+    seconds = dict(front.seconds)
+    return {"points": len(front.steps), "complete": front.complete, "seconds": seconds}
 
 
 def front_spent(front: Front) -> Spent:
@@ -102,8 +101,7 @@ def front_spent(front: Front) -> Spent:
 
 def numbered(front: Front) -> pd.DataFrame:
     """Return the table of a Pareto set, its points counted from 1."""
-    table = shown_table(front.table)
-    return table.set_axis(pd.RangeIndex(1, len(table) + 1, name="point"))
+    return shown_table(front.table).set_axis(pd.RangeIndex(1, len(front.table) + 1, name="point"))
 
 
 def front_files(

@@ -1,5 +1,6 @@
 """What a notebook shows of a value: what it says at the prompt and, with matplotlib, a picture.
 
+Of a page it is the step viewer as a widget: Python reads and sets its step (extra ``notebook``).
 Pictures have a white background; nothing slow is computed for them.
 """
 
@@ -8,9 +9,12 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from contextlib import suppress
+from functools import cache
 from html import escape
-from typing import TYPE_CHECKING
+from importlib import resources
+from typing import TYPE_CHECKING, Any
 
+from seqopt._files import Page
 from seqopt._registry import display
 from seqopt.errors import ExtraError
 from seqopt.plan.build import ShownBuild
@@ -76,3 +80,31 @@ def _pictures(value: object) -> list[Figure]:
 def _is_small(value: ShownBuild) -> bool:
     """Return whether responses of a build are computed for its card."""
     return bool(value.steps) and len(value.engine.network.scene.bricks) <= SMALL
+
+
+@cache
+def _viewer_class() -> type[Any]:
+    """Return the class of widgets, which lists what goes to and fro between Python and page."""
+    try:
+        import anywidget  # noqa: PLC0415  # an extra
+        from traitlets import Int, Unicode  # noqa: PLC0415  # comes with it
+    except ModuleNotFoundError:
+        raise ExtraError(
+            "widgets need anywidget, which is not installed: pip install 'seqopt[notebook]'"
+        ) from None
+    traits = {
+        "_esm": (resources.files("seqopt") / "data/viewer/widget.mjs").read_text(encoding="utf-8"),
+        "page": Unicode(read_only=True).tag(sync=True),
+        "height": Int(900, min=100).tag(sync=True),
+        "step": Int(0, min=0, help="from 1; 0: the one that decides").tag(sync=True),
+        "build": Unicode(help="name of the first build that is shown").tag(sync=True),
+        "__module__": __name__,
+    }
+    return type("StepViewer", (anywidget.AnyWidget,), traits)
+
+
+def step_viewer(page: Page, step: int = 0) -> Any:
+    """Return the widget of a page with the step viewer, at one of its steps."""
+    widget = _viewer_class()(height=page.height, step=step)
+    widget.set_trait("page", page.text)
+    return widget

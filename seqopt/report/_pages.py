@@ -197,10 +197,9 @@ def front_page(
         (build,) = _builds(placed, {name: plan}, departures, verdicts)
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
-    words = {**IN_UNITS, "F_largest": IN_UNITS["F_rob"]}  # another name for the same
     points = shown_table(front.table).set_axis([*plans])
     points = points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points})
-    points = points.rename(columns=words)
+    points = points.rename(columns={**IN_UNITS, "F_largest": IN_UNITS["F_rob"]})
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if departures:
         shown[OUTSIDE] = ["yes" if name in departures else "" for name in plans]

@@ -132,7 +132,7 @@ def steps_picture(
         if forces:
             draw_network(*drawn, edge_force=fields[at].edge_force[0], largest_force=largest)
         else:
-            _draw_robots(axes, cell, cell.arms(step, at), VIEW)
+            _draw_robots(axes, cell, cell.arms(step, at, arms or {}), VIEW)
             _draw_props(axes, scene, step.bricks, held=bool(step.held), view=VIEW)
             draw_bricks(*drawn, alpha=0.15 if magnify else 1.0)
             if magnify:

@@ -75,10 +75,8 @@ def compare(  # noqa: PLR0913  # every question is a word of its own
     check_reference(reference)
     own = own_engine(scene, engine, mortar, robots=robots, stability=stability)
     find_postures(own.network.scene, cache, progress)
-    costs, tell = (
-        find_criterion(criterion or DEFAULTS["any other"][0]),
-        progress or (lambda _: None),
-    )
+    costs = find_criterion(criterion or DEFAULTS["any other"][0])
+    tell = progress or (lambda _: None)
     named = () if robots is None or isinstance(robots, int) else robots
     proven = prover or find_prover(own.network, mortar, progress, asks=stability)
     return compare_builds(own, costs, tell, named, proven, speed, reference)

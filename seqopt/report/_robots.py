@@ -38,13 +38,13 @@ Arms = Mapping[str, Sequence[Floats | PosedArm | None]]
 class Cell:
     """Where the robots of a scene stand, and how they hold nodes.
 
-    ``arms``: lines that are known; the others are sketched. It has the ``corners`` of all bricks,
+    ``arms``: lines that are known; others are sketched, each once. ``corners``: of all bricks,
     (k, 3), the ``level`` of the ground, that of the lowest corner, the ``size`` of the structure,
     its longest diagonal, and its ``middle`` on the ground, (3,), m.
     """
 
     def __init__(self, scene: Scene, arms: Arms | None = None) -> None:
-        self.scene, self._arms = scene, arms or {}
+        self.scene = scene
         self._sketched = dict[tuple[str, int | None], Floats]()  # points (k, 3), m
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
@@ -54,8 +54,8 @@ class Cell:
         self.middle = self._on_ground(0.5 * (low + high))
         first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
         self._sides = np.stack([first, np.cross(self.up, first)])  # level directions (2, 3)
-        every = [arm for own in self._arms.values() for arm in own if arm is not None]
-        self._known = [*{id(arm): arm for arm in every}.values()]
+        every = (arm for own in (arms or {}).values() for arm in own)
+        self._known = [*{id(arm): arm for arm in every if arm is not None}.values()]
 
     @cached_property
     def stands(self) -> Floats:
@@ -71,11 +71,11 @@ class Cell:
         bodies = [body for arm in self._known if isinstance(arm, PosedArm) for body in arm.bodies]
         return np.vstack([np.zeros((0, 3)), *lines, *bodies])
 
-    def arms(self, step: Step, at: int) -> list[Floats | PosedArm | None]:
+    def arms(self, step: Step, at: int, known: Arms) -> list[Floats | PosedArm | None]:
         """Return the shapes of every robot in a step, the ``at``-th of those of known arms."""
         pairs = zip(self.scene.robots, step.grips, strict=True)
         return [
-            self._arms[robot.name][at] if robot.name in self._arms else self.arm(robot, node)
+            known[robot.name][at] if robot.name in known else self.arm(robot, node)
             for robot, node in pairs
         ]
 
@@ -208,16 +208,15 @@ def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
     return out
 
 
-def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
+def arm_data(cell: Cell, steps: Sequence[Step], known: Arms) -> dict[str, object]:
     """Return the arms of robots in every step, ready for JSON.
 
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
     robot's among them, or -1.
     """
-    cell, places = Cell(scene, given), {id(None): -1}
-    lines, at = list[object](), list[list[int]]()
+    places, lines, at = {id(None): -1}, list[object](), list[list[int]]()
     for s, step in enumerate(steps):
-        row = cell.arms(step, s)
+        row = cell.arms(step, s, known)
         for arm in row:
             if arm is not None and id(arm) not in places:
                 places[id(arm)] = len(lines)

@@ -30,14 +30,7 @@ from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import _deciding_step, _in_a_sentence, _robot_words
 from seqopt.responses.quantities import _number_text
-from seqopt.responses.table import (
-    OUTSIDE,
-    Departure,
-    _distinct,
-    _each_fields,
-    force_column,
-    step_fields,
-)
+from seqopt.responses.table import OUTSIDE, Departure, _distinct, _each_fields, force_column
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
@@ -65,11 +58,9 @@ class Build:
 
     ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
     ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
-    responses; ``order`` names the bricks as they are placed, where that is not the scene's own
-    order; ``arms``: the joints of
-    robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
-    entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
-    steps arms cannot be, in words.
+    responses; ``order`` names the bricks as they are placed, where that is not the scene's own;
+    ``arms``: of robots whose postures are known, by name (of others a simple arm is drawn);
+    ``faults``: in which steps arms cannot be, in words.
     """
 
     name: str
@@ -87,13 +78,12 @@ class Build:
         return _in_a_sentence(scene, self.table, self.verdicts, self.departures, self.faults)
 
 
-def _structure_data(network: Network) -> dict[str, object]:
+def _structure_data(network: Network, cell: Cell) -> dict[str, object]:
     """Return a structure as lists, ready for JSON.
 
     Edges end with their brick count; ``carried`` are the bricks that every node moves with.
     """
     scene, graph = network.scene, network.graph.to_undirected(as_view=True)
-    cell = Cell(scene)
     moving = ({data["brick"] for *_, data in graph.edges(n, data=True)} for n in network.node_name)
     return {
         "name": scene.name,
@@ -154,9 +144,10 @@ def _solid(brick: Brick) -> dict[str, object]:
 def _build_data(
     engine: Engine,
     build: Build,
-    known: Mapping[tuple[int, Grips], Fields] | None = None,
+    cell: Cell,
+    known: Mapping[tuple[int, Grips], Fields],
     *,
-    fields: bool = True,
+    fields: bool,
 ) -> dict[str, object]:
     """Return the steps of a build as lists, ready for JSON.
 
@@ -180,7 +171,7 @@ def _build_data(
         ],
         "decides": _deciding_step(scene, build.table, build.verdicts, build.departures),
         "sentence": build.sentence(scene),
-        "arms": arm_data(scene, build.steps, build.arms),
+        "arms": arm_data(cell, build.steps, build.arms),
         "steps": [
             {
                 "number": step.number,
@@ -193,7 +184,7 @@ def _build_data(
         "columns": lines[0],
         "rows": lines[1:],
         "forces": [force_column(robot) for robot in scene.robots],
-        **(_fields(engine, build, known or {}) if fields else dict.fromkeys(FIELDS)),
+        **(_fields(engine.network, build, known) if fields else dict.fromkeys(FIELDS)),
     }
 
 
@@ -215,16 +206,15 @@ def _marks(scene: Scene, build: Build) -> list[str]:
 
 
 def _fields(
-    engine: Engine, build: Build, known: Mapping[tuple[int, Grips], Fields]
+    network: Network, build: Build, known: Mapping[tuple[int, Grips], Fields]
 ) -> dict[str, object]:
     """Return twists (steps, B, 6), edge forces (steps, E) and reactions, packed."""
-    network = engine.network
     count = len(build.steps)
     twist = np.zeros((count, len(network.inner), 6))
     edge = np.zeros((count, len(network.edge_nodes)))
     support = np.zeros((count, len(network.springs.support), 6))
     for i, step in enumerate(build.steps):
-        found = known.get((step.bricks, step.grips)) or step_fields(engine, step, _WANT)
+        found = known[step.bricks, step.grips]
         twist[i, : step.bricks] = found.brick_twist[0]
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
         support[i] = found.support[0]
@@ -299,18 +289,18 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
     """Return the viewer's data of builds, with fields of as many as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
-    network = engine.network
+    network, cell = engine.network, Cell(engine.network.scene)
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
     states = _distinct(build.steps for build in compress(builds, drawn))
     known = dict(zip(states, _each_fields(engine, states.values(), _WANT), strict=True))
-    why = "they place bricks in another order than the scene" if len(drawn) > sum(drawn) else ""
+    why = "" if all(drawn) else "they place bricks in another order than the scene"
     why = "there are too many steps" if ends[-1] > MOST else why
     return {
-        "structure": _structure_data(network),
+        "structure": _structure_data(network, cell),
         "builds": [
-            _build_data(engine, build, known, fields=fields)
+            _build_data(engine, build, cell, known, fields=fields)
             for build, fields in zip(builds, drawn, strict=True)
         ],
         "responses": RESPONSES,

@@ -14,6 +14,7 @@ from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, OpeningEngine, Want
 from seqopt.engines.registry import AutoEngine, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
+from seqopt.responses.quantities import _steps_in_words
 from seqopt.responses.table import LinearRange, _held_cells, _table_of, response_table, step_fields
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -82,3 +83,12 @@ def _with_faults(
     )
     ordered = [rows[number] for number in sorted(rows)]
     return _table_of({name: [row.get(name, np.nan) for row in ordered] for name in names})
+
+
+def faults_said(faults: Mapping[int, SeqoptError], steps: int) -> Iterator[str]:
+    """Yield which steps of how many are mechanisms, and for which the solver failed."""
+    for what, kind in (("mechanism", MechanismError), ("solver failed", SolverError)):
+        own = {number: error for number, error in faults.items() if isinstance(error, kind)}
+        if own:
+            where = f"{len(own)} of {steps} steps" if len(own) < steps else "every step"
+            yield f"{what}: {where} ({_steps_in_words([*own])}); {own[min(own)]}"

@@ -57,7 +57,7 @@ from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
-_KEPT = 8  # answers that are tried on steps with more grips
+_KEPT = 128  # answers that are tried on steps with more grips
 _NEAR = 0.7  # share of all blocks up to which those near what fell take less than all
 _MOVES = 1e-2  # of the largest motion, over which a block falls
 Parts = Callable[[int, Grips], Assembly]

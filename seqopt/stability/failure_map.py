@@ -116,6 +116,7 @@ class BuildProver:
     ) -> None:
         self.network, self.mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
+        self._first = dict[tuple[str, _State], tuple[str, str]]()  # that moves where one falls
         self._parts: PartialAssemblies | None = None  # of as many bricks as any step had so far
         self.refusal, self.proven = "", 0
 
@@ -123,6 +124,14 @@ class BuildProver:
     def spent(self) -> dict[str, int]:
         """How many verdicts were asked, by state and mortar, and how many were proven for them."""
         return {"verdicts": sum(map(len, self._known.values())), "proven": self.proven}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Why verdicts are missing, and which effects they neglect, in words."""
+        said = [f"not proven; {self.refusal}"] if self.refusal else []
+        if self.mortars and (moves := _settlement_said(self.network.scene)):
+            said.append(moves)
+        return tuple(f"stability: {each}" for each in said)
 
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
@@ -165,9 +174,12 @@ class BuildProver:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
-                parts = self._parts or self.network
-                (found,) = each_verdict(parts, [step], self.mortars[name])
-                first = found.first_block, found.first_contact
+                key = name, _state(step)
+                if key not in self._first:
+                    parts = self._parts or self.network
+                    (found,) = each_verdict(parts, [step], self.mortars[name])
+                    self._first[key] = found.first_block, found.first_contact
+                first = self._first[key]
                 return BuildVerdicts(name, verdicts, step.number, *first, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from math import degrees, pi
+from math import degrees, pi, radians
 from operator import le
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from seqopt.contact.mortar import (
     Mortar,
     _find_curing,
     _mortar_name,
+    _with_friction,
     _with_mortar,
     bond_mortar,
     find_mortar,
@@ -267,3 +268,40 @@ def _size(name: str, value: float) -> float:
 def slack(name: str, value: float) -> float:
     """Return the width within which one of `MARGINS` is proven."""
     return max(NARROW * _size(name, value), _LEAST[name])
+
+
+def find_standing(
+    *,
+    stands: str | None = None,
+    friction: float | None = None,
+    tilt: float | None = None,
+    curing: Sequence[str] = (),
+) -> Standing | None:
+    """Return the demand that every state stands, None if there is none.
+
+    Parameters
+    ----------
+    stands : str
+        Every state must be proven to stand, robots within payload: dry, epoxy or bond=STRENGTH
+        (Pa).
+    friction : float
+        With ``stands``: coefficient of friction.
+    tilt : float
+        With ``stands``: tilt that every state must survive.
+    curing : sequence of str
+        With ``stands``: which share of its bond mortar has at an age: 15min (in proportion, full
+        then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never.
+        What is let go waits for it (default: full at once).
+    """
+    said = {"tilt": tilt, "friction": friction, "curing": curing}
+    names = [name for name, value in said.items() if value not in (None, ())]
+    if stands is None:
+        if names:
+            usual = "epoxy" if names[0] == "curing" else "dry"
+            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {usual}, say")
+        return None
+    mortar = _with_friction(find_mortar(stands, "stands"), friction)
+    if tilt is not None and not tilt < 90:
+        raise ProblemError(f"--tilt {tilt:g}: give an angle from 0 to below 90 degrees")
+    cures = _find_curing(" ".join(curing)) if curing else None
+    return Standing(mortar, radians(tilt or 0.0), cures)

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from seqopt.contact.mortar import Mortar
+from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.plan.build import GivenSequence
 from seqopt.questions import Built, Steps, find_build
 from seqopt.stability.standing import Standing
 from seqopt.times._step_check import check_cured
 from seqopt.work import Tell
+
+USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
 def times(
@@ -72,3 +75,12 @@ def times(
     if standing is not None:
         check_cured(build.engine.network, own, standing, starts)
     return out
+
+
+def with_usual_durations(build: GivenSequence) -> GivenSequence:
+    """Return a build whose robots take `USUAL_SECONDS`, if it is not known how long they take."""
+    scene = build.engine.network.scene
+    if all(robot.durations for robot in scene.robots):
+        return build
+    engine = make_engine(USUAL, scene.with_durations(USUAL_SECONDS))
+    return GivenSequence(engine, build.steps, build.title)

@@ -50,6 +50,17 @@ class TimedGraph(FrozenValue):
         """How many there are to share the work: all as one, then robots of every kind, (1 + k,)."""
         return np.array([1, *np.bincount(self.kinds)])
 
+    def only(self, kept: Ints, graph: Graph) -> TimedGraph:
+        """Return what is left of it in the ``graph`` of some of its states and their moves."""
+        on = np.isin(np.arange(len(self.levels)), kept)
+        moves = on[self.graph.source] & on[self.graph.target]
+        acts = moves[self.move]
+        of_states = {name: getattr(self, name)[on] for name in ("levels", "free", "alike")}
+        of_moves = {name: getattr(self, name)[moves] for name in ("prepares", "acts", "work")}
+        of_acts = {name: getattr(self, name)[acts] for name in ("column", "origin")}
+        move = (np.cumsum(moves) - 1)[self.move[acts]]
+        return replace(self, graph=graph, move=move, **of_states, **of_moves, **of_acts)
+
 
 class _Moves(NamedTuple):
     """What moves do, by column of the state before or after."""

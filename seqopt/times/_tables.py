@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
 from seqopt.errors import StepError
+from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
@@ -80,6 +81,14 @@ def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) 
     return table.reset_index()
 
 
+def busy_said(busy: pd.DataFrame) -> Iterator[str]:
+    """Yield how each robot spends its time, from `busy_table`, in words."""
+    for row in busy.to_dict("records"):
+        named = ("prepares", "acts", "holds", "idle")
+        spent = (f"{what} {row[f'{what}_s']:.6g} s" for what in named)
+        yield f"  {row['robot']}: {', '.join(spent)}"
+
+
 def reassign(
     scene: Scene,
     steps: Sequence[Step],
@@ -127,3 +136,15 @@ def reassign(
     idle, every = idle_robots(scene, steps), enumerate(scene.robots)
     known = [r for r, robot in every if robot.durations is not None or robot.name not in idle]
     return reassigned_steps(scene, steps, may, known, waits, begin)
+
+
+def waits_said(build: ShownBuild) -> Iterator[str]:
+    """Yield the total wait for mortar of a judged build."""
+    if build.standing is None or build.standing.curing is None:
+        return
+    table = build.times()
+    waits = table[table["cures_s"] > 0]
+    steps, total = f"{len(waits)} step{'s' * (len(waits) > 1)}", waits["cures_s"].sum()
+    said = f"{total:.6g} s are waits for mortar, in {steps}"
+    yield said if len(waits) else "no step waits for mortar"
+    yield "every state is proven to stand with the bond that its joints have when it begins"

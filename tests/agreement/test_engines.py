@@ -117,24 +117,6 @@ def test_three_routes_agree_where_joints_are_loose(state):
             assert difference <= tolerance * scale, name
 
 
-@settings(max_examples=6)
-@given(state=states(max_grips=3), data=st.data())
-def test_a_batch_equals_its_sets_one_by_one(state, data):
-    scene, bricks, grips = state
-    engine = ComplianceEngine(build_network(scene))
-    nodes = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
-    count = grips.shape[1]
-    one = st.lists(st.sampled_from(nodes), min_size=count, max_size=count, unique=True)
-    rows = data.draw(st.lists(one, min_size=1, max_size=5))
-    batch = np.array(rows, int).reshape(len(rows), count)
-    whole = engine.solve(bricks, batch, Want.ALL)
-    for i, row in enumerate(batch):
-        single = engine.solve(bricks, row[None], Want.ALL)
-        for name in FIELDS:
-            a, b = getattr(whole, name)[i], getattr(single, name)[0]
-            assert np.abs(a - b).max(initial=0) <= 1e-9 * np.abs(b).max(initial=1e-300)
-
-
 @pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
 @pytest.mark.parametrize("factor", [1e-3, 1e3])
 def test_mechanisms_are_told_from_sound_structures(arch25, engine_type, factor):

@@ -87,8 +87,7 @@ def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, c
     def missing(*_):
         raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
 
-    for where in ("seqopt._cli.inputs", "seqopt.arms._kept"):
-        monkeypatch.setattr(f"{where}.find_postures", missing)
+    monkeypatch.setattr("seqopt.arms._kept.find_postures", missing)
     out = folder / "proposed.json"
     assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
     assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err

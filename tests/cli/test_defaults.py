@@ -171,15 +171,6 @@ def test_all_built_in_scenes_are_listed_a_line_each(capsys):
         assert line.endswith(ABOUT[name])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", builtin_scenes())
-def test_a_built_in_scene_is_exported_and_read_again(capsys, tmp_path, name):
-    path = tmp_path / "scene.json"
-    out = command(capsys, "scene", name, "--export", path)[1]
-    assert f"{name}: {len(load_scene(name).bricks)} bricks" in out
-    assert load_scene(path) == load_scene(name)
-
-
 def test_a_stiffness_is_that_of_all_robots(tmp_path, capsys):
     path = tmp_path / "soft.json"
     words = ("scene", "arch25", "--grips", "1e6x1e6x5e5,turning=2e4", "--export", path)
@@ -211,20 +202,6 @@ def test_props_are_said_in_words(capsys, tmp_path):
     props = load_scene(own).props
     assert len(props) >= 5
     assert {prop.stiffness for prop in props} == {(1e5,) * 3}
-
-
-def test_an_older_word_does_as_before_and_says_the_new_one(capsys):
-    scene = "chain:bricks=6"
-    words = ("optimize", scene, "--schedule", "free", "--json", "--no-stability")
-    for older in (("--criteria", "weighted"), ("--criteria=weighted",)):
-        status, out, err = command(capsys, *words, *older)
-        assert (status, err.splitlines()[0]) == (0, "seqopt: --criteria is called --criterion now")
-        assert json.loads(out)["summary"]["criterion"].startswith("weighted")
-    _, new, err = command(capsys, *words, "--criterion", "weighted")
-    assert "is called" not in err
-    assert json.loads(new)["summary"]["objective"] == json.loads(out)["summary"]["objective"]
-    quiet = (*words, "--criteria", "weighted", "--quiet")
-    assert "is called" not in command(capsys, *quiet)[2]
 
 
 def test_a_pareto_set_takes_a_criterion_as_others_do(capsys):

@@ -112,8 +112,10 @@ def test_a_device_is_no_output(capsys):
 
 def test_an_input_is_not_overwritten(capsys, tmp_path):
     scene, plan = tmp_path / "plan.csv", tmp_path / "steps.csv"  # a scene under an output's name
+    tower = tmp_path / "tower.json"
     assert main(["scene", "--export", str(scene)]) == 0
     plan.write_text(PLAN, encoding="utf-8")
+    tower.write_text(json.dumps(DOCUMENTS["assembly"]), encoding="utf-8")
     capsys.readouterr()
     before = scene.read_bytes()
     for words in (
@@ -122,11 +124,15 @@ def test_an_input_is_not_overwritten(capsys, tmp_path):
         ("analyze", scene, "--plan", plan, "--out", scene),
         ("assess", "--plan", plan, "--out", plan),
         ("optimize", scene, "--formulation", "overlap_dp", "--out", tmp_path),
+        ("import", tower, "--unit", "m", "--density", "1", "--out", tower),
+        ("export", tmp_path, "--out", scene),
     ):
         assert "it is the input" in refused(capsys, *words)
+    assert "it has no scene.json" in refused(capsys, "export", tmp_path, "--out", tmp_path / "x")
     assert scene.read_bytes() == before
     assert plan.read_text(encoding="utf-8") == PLAN
-    assert len(list(tmp_path.iterdir())) == 2
+    assert json.loads(tower.read_text(encoding="utf-8")) == DOCUMENTS["assembly"]
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 @pytest.fixture
@@ -172,17 +178,6 @@ def test_what_is_wrong_is_one_line_and_writes_nothing(source, tmp_path, capsys, 
     assert said in error
     assert error.count("\n") == 1
     assert not out.exists()
-
-
-def test_inputs_are_not_overwritten(source, tmp_path, capsys):
-    words = ("--unit", "m", "--density", "1")
-    assert status_of("import", source, *words, "--out", source) == 2
-    assert "it is the input" in capsys.readouterr().err
-    assert json.loads(source.read_text(encoding="utf-8")) == DOCUMENTS["assembly"]
-    assert status_of("export", tmp_path, "--out", tmp_path / "plan.csv") == 2
-    assert "it is the input" in capsys.readouterr().err
-    assert status_of("export", tmp_path, "--out", tmp_path / "x.csv") == 2
-    assert "it has no scene.json" in capsys.readouterr().err
 
 
 def test_options_reach_the_scene(tmp_path):

@@ -12,6 +12,7 @@ import seqopt
 from seqopt._cli.registry import COMMANDS, every_command
 from seqopt.errors import InfeasibleError, PluginWarning, ProblemError, StepError
 from seqopt.sequence.rules import FreeRules
+from tests.builders import install
 from tests.commands import command
 from tests.commands import command as run
 
@@ -133,14 +134,11 @@ WEIGH = seqopt.Command("weigh", weigh)
 def package(tmp_path, monkeypatch):
     """Install a package that has a command, by its entry point."""
 
-    def install(entry):
-        info = tmp_path / "my_package-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[seqopt.parts]\nweigh = {entry}\n")
+    def installed(entry):
+        install(tmp_path, "seqopt.parts", weigh=entry)
         monkeypatch.syspath_prepend(tmp_path)
 
-    return install
+    return installed
 
 
 def test_a_package_adds_a_command(package, capsys):

@@ -212,13 +212,13 @@ def test_a_fault_of_the_program_has_a_status_that_no_answer_has():
     """Python ends with 1, which is the status of what does not hold."""
     program = """
 import sys
-import seqopt._cli.commands.judge
+import seqopt._cli.commands.instances
 from seqopt.__main__ import run
 
 def fails(path):
     raise KeyError(chr(27) + "[2J")
 
-seqopt._cli.commands.judge.read_instance = fails
+seqopt._cli.commands.instances.read_instance = fails
 sys.argv = ["seqopt", "judge", "a", "b"]
 sys.exit(run())
 """

@@ -131,15 +131,6 @@ def test_assess_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
     assert np.isnan(row["bond_needed_Pa"])
 
 
-def test_a_bad_scene_gets_one_line(capsys, tmp_path):
-    path = scene_file(capsys, tmp_path, lambda d: d["bricks"][4].update(density="heavy"))
-    target = tmp_path / "out.csv"
-    words = ("analyze", str(path), "--method", "sequential", "--out", str(target))
-    status, _, err = run(capsys, *words)
-    assert (status, err.count("\n"), target.exists()) == (2, 1, False)
-    assert "brick 5: density is 'heavy'; give a positive number" in err
-
-
 def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path):
     path, out = scene_file(capsys, tmp_path, lambda d: d["joints"].pop(3)), tmp_path / "out.csv"
     words = ("analyze", str(path), "--method", "sequential", "--out", str(out))

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.builders import ROOT
+from tests.builders import ROOT, install
 
 PAGE = "tutorials/adding_formulation.md"
 TESTS = [f"tests/formulations/test_{name}.py" for name in ("conformance", "degenerate")]
@@ -35,19 +35,10 @@ def test_a_formulation_takes_few_lines_and_one_import():
     assert [node.module for node in imports] == ["formulations.on_graph"]
 
 
-def installed(folder):
-    """Write a package with the formulation of the page as if it were installed."""
-    (folder / "page_once.py").write_text(written(), encoding="utf-8")
-    about = folder / "pages-1.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: pages\nVersion: 1\n")
-    entries = "[seqopt.formulations]\nonce = page_once:FORMULATION\n"
-    (about / "entry_points.txt").write_text(entries)
-
-
 @pytest.mark.slow
 def test_the_formulation_of_the_page_passes_what_is_recommended(tmp_path):
-    installed(tmp_path)
+    (tmp_path / "page_once.py").write_text(written(), encoding="utf-8")
+    install(tmp_path, "seqopt.formulations", once="page_once:FORMULATION")
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow"]
     found = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
     done = subprocess.run(

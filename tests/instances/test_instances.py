@@ -1,6 +1,7 @@
 """Instances: compiled, written, read, solved and judged; checks are given wrong answers too."""
 
 import json
+import zipfile
 from dataclasses import replace
 
 import highspy
@@ -11,6 +12,7 @@ import seqopt
 from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
+from seqopt.instances._files import TEXT
 from seqopt.sequence.rules import with_robots
 from tests.builders import small_arch
 
@@ -251,6 +253,30 @@ def test_files_that_are_no_instances_are_named(tmp_path, compiled):
         seqopt.read_instance("chain-12-wy")
     with pytest.raises(FileError, match="no format"):
         seqopt.save_instance(compiled("sum"), tmp_path / "x.xyz")
+
+
+@pytest.mark.parametrize(
+    ("part", "wrong"),
+    [
+        ("caps", {"most": float("nan")}),
+        ("caps", {"most": -1.0}),
+        ("goals", {"columns": [0, 0]}),
+        ("goals", {"kind": "tail", "columns": []}),
+        ("goals", {"columns": [9]}),
+    ],
+)
+def test_a_text_that_asks_for_what_is_not_there_is_refused(compiled, tmp_path, part, wrong):
+    path = tmp_path / "x.npz"
+    seqopt.save_instance(compiled("capped"), path)
+    with np.load(path) as archive:
+        parts = {f"{name}.npy": archive.zip.read(f"{name}.npy") for name in archive if name != TEXT}
+        document = json.loads(archive[TEXT])
+    document[part][0] |= wrong
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in {**parts, TEXT: json.dumps(document)}.items():
+            archive.writestr(name, content)
+    with pytest.raises(FileError, match=r"instance.json, |column 9 is named"):
+        seqopt.read_instance(path)
 
 
 def test_commands_write_and_judge(tmp_path, capsys):

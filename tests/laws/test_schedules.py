@@ -244,16 +244,6 @@ def test_a_mirrored_scene_has_mirrored_ends(mirror, state):
     assert np.abs(two.support - turned).max() <= 1e-8 * size(build_network(scene), one)
 
 
-@pytest.mark.parametrize("bricks", [2, 4, 6, 7])
-def test_a_symmetric_arch_has_ends_that_mirror_each_other(bricks):
-    """With no grip, and with grips that mirror each other."""
-    net = build_network(from_both_sides(7))  # nodes 0 to 13 from one end to the other
-    axes = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
-    for grips in (HERE, [[1, 12]]):
-        support = ComplianceEngine(net).solve(bricks, grips).support[0]
-        assert support[1] == pytest.approx(axes * support[0], abs=1e-9 * np.abs(support).max())
-
-
 @given(state=states(any_scene), data=st.data())
 def test_the_order_of_the_ends_changes_the_axis_and_nothing_else(state, data):
     scene, bricks, grips = state

@@ -23,7 +23,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.methods import modified_sequential, three_robot_loop
 from seqopt.study import EQUATIONS
-from tests.builders import six_bricks
+from tests.builders import install, six_bricks
 from tests.layered import Budget, Costs, answer
 
 
@@ -156,12 +156,8 @@ def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said
 def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path, capsys):
     """A package of others that is wrong spoils no command that does not ask for it."""
     whole = formulations()
-    folder = tmp_path / "odd-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
-    entries = "odd = math:pi\nodder = no_such_package:X\noddest = odd_formulation:X\n"
-    entries += "oddly = odd_formulation:Y\n"
-    (folder / "entry_points.txt").write_text(f"[seqopt.formulations]\n{entries}")
+    own = {"oddest": "odd_formulation:X", "oddly": "odd_formulation:Y"}
+    install(tmp_path, "seqopt.formulations", odd="math:pi", odder="no_such_package:X", **own)
     text = "from formulations.cascade import FORMULATION as F\n"
     text += "from dataclasses import replace\nX = replace(F, kind='exact')\n"
     text += "Y = replace(F, answers=('goals', 'walls'))\n"

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import Bounds, LinearConstraint, milp
 
 import seqopt
 from experiments.harness.layers import LayeredCosts
+from formulations._instance_program import program
 from formulations.on_graph import by_weights, cheapest_by, least_total
 from formulations.overlap_dp import OVERLAP_DP
-from formulations.scenario_program import solve_program
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Run, Watch, as_formulation
@@ -118,10 +119,13 @@ def test_plans_agree_with_the_program(aim, layers):
     if not values(layers, aim):
         return
     plan = solved(layers, aim)
-    most, graph = aim.most(len(layers)), compile_totals("drawn", layers, aim).instance.asked
-    value = solve_program(graph, most, whole=True)[1]
+    asked = program(compile_totals("drawn", layers, aim).instance)
+    rules = LinearConstraint(asked.matrix, asked.low, asked.high)
+    value, relaxed = (
+        milp(asked.cost, integrality=whole, bounds=Bounds(0, asked.upper), constraints=rules).fun
+        for whole in (asked.whole, 0 * asked.whole)
+    )
     assert value == pytest.approx(plan.certificate.objective, abs=1e-5)
-    relaxed = solve_program(graph, most, whole=False)[1]
     assert relaxed == pytest.approx(plan.certificate.bound, abs=1e-4 * max(1.0, abs(relaxed)))
 
 

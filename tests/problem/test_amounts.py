@@ -29,7 +29,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.responses.scales import NEVER, Units
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
-from tests.builders import small_arch
+from tests.builders import install, small_arch
 
 pytestmark = pytest.mark.usefixtures("alone")
 
@@ -136,11 +136,7 @@ def test_an_expensive_filter_is_asked_of_what_passes_all_others():
 
 def test_a_package_adds_both_by_entry_points(tmp_path, monkeypatch):
     (tmp_path / "page_parts.py").write_text(PACKAGE, encoding="utf-8")
-    about = tmp_path / "parts-1.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: parts\nVersion: 1\n")
-    entries = "busy = page_parts:BUSY\naway = page_parts:AWAY\n"
-    (about / "entry_points.txt").write_text(f"[seqopt.parts]\n{entries}")
+    install(tmp_path, "seqopt.parts", busy="page_parts:BUSY", away="page_parts:AWAY")
     with pytest.raises(ProblemError, match="aim 'busy' does not exist"):
         find_amount("busy")
     monkeypatch.syspath_prepend(tmp_path)

@@ -21,11 +21,11 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.network.network import build_network
-from seqopt.report import page
+from seqopt.report import _robots, page
+from seqopt.report._notebook import _viewer_class
 from seqopt.report._pages import OVER, plan_page
 from seqopt.report._robots import Cell, arm_data
-from seqopt.report._widget import _viewer_class
-from seqopt.report.page import LARGEST, Build, _build_data, _structure_data, report_page
+from seqopt.report.page import LARGEST, Build, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.methods import sequential
@@ -58,7 +58,7 @@ def data_of(text):
 
 def test_what_is_read_is_the_table_digit_by_digit(engine25, builds):
     build = builds["sequential"]
-    data = _build_data(engine25, build)
+    (data,) = data_of(report_page(engine25, [build], ""))["builds"]
     lines = csv_text(build.table).splitlines()
     assert [",".join(row) for row in [data["columns"], *data["rows"]]] == lines
     assert [step["grips"] for step in data["steps"]] == [list(step.grips) for step in build.steps]
@@ -67,7 +67,8 @@ def test_what_is_read_is_the_table_digit_by_digit(engine25, builds):
 
 def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
     build = builds["cantilever"]
-    data, count = _build_data(engine25, build), len(build.steps)
+    (data,) = data_of(report_page(engine25, [build], ""))["builds"]
+    count = len(build.steps)
     twist, edge = (unpacked(data[name], count) for name in ("twist", "edge"))
     for i in (0, 7, count - 1):
         step = build.steps[i]
@@ -81,9 +82,9 @@ def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
             assert not found[len(exact) :].any()  # bricks that are not there yet
 
 
-def test_the_structure_is_that_of_the_network(engine25):
+def test_the_structure_is_that_of_the_network(engine25, builds):
     network = engine25.network
-    data = _structure_data(network)
+    data = data_of(report_page(engine25, [builds["sequential"]], ""))["structure"]
     assert len(data["bricks"]) == 25
     assert len(data["edges"]) == len(network.edge_nodes)
     for brick, drawn in zip(network.scene.placed, data["bricks"], strict=True):
@@ -325,7 +326,7 @@ def test_an_arm_leads_from_the_ground_to_the_node(scene):
 def test_postures_that_are_known_are_drawn_as_they_are():
     own = np.arange(12.0).reshape(4, 3)
     lines = [None, *[own] * (len(STEPS) - 1)]
-    data = arm_data(SCENE, STEPS, {"front": lines})
+    data = arm_data(Cell(SCENE), STEPS, {"front": lines})
     drawn = [data["at"][s][1] for s in range(len(STEPS))]
     assert drawn[0] == -1
     assert [data["lines"][i] for i in drawn[1:]] == [own.tolist()] * (len(STEPS) - 1)
@@ -346,3 +347,18 @@ def test_a_page_has_arms(text):
             if node is not None:
                 tip = build["arms"]["lines"][place][-1]
                 assert tip == pytest.approx(SCENE.node_position(node), abs=1e-4)
+
+
+def test_builds_side_by_side_share_what_is_drawn_alike(monkeypatch):
+    """A robot that holds a node is sketched once, however many builds have it so."""
+    sketched = []
+    own = _robots.hold
+    monkeypatch.setattr(
+        _robots, "hold", lambda s, r, n: sketched.append((r.name, n)) or own(s, r, n)
+    )
+    engine = make_engine("compliance", build_network(SCENE))
+    build = Build("sequential", STEPS, analyze(engine, STEPS))
+    text = report_page(engine, [build, replace(build, name="again")], "A wall.")
+    first, again = (build["arms"] for build in data_of(text)["builds"])
+    assert first == again
+    assert len(sketched) == len({*sketched}) > 0

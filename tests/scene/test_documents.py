@@ -18,7 +18,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.scene_file import _find_warnings, _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes
-from tests.builders import running_bond, six_bricks, with_part
+from tests.builders import six_bricks, with_part
 from tests.strategies import arches, flat_arches, scenes_with_all, walls
 
 TEXT = dump_scene(six_bricks())
@@ -290,16 +290,6 @@ def test_odd_units_in_words_are_named(words, said):
 @given(scene=st.one_of(arches(), walls(), flat_arches()))
 def test_scenes_of_tests_are_not_odd(scene):
     assert not [*_find_warnings(scene)]
-
-
-@pytest.mark.parametrize(
-    "scene", [load_scene("arch25"), running_bond(6, 4)], ids=lambda scene: scene.name
-)
-def test_ordinary_scenes_are_not_odd(tmp_path, scene):
-    save_scene(scene, tmp_path / "scene.json")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert load_scene(str(tmp_path / "scene.json")) == scene
 
 
 @pytest.mark.parametrize("name", ["pitch", "yaw"])

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from formulations._instance_program import Program, program
 from seqopt.arrays import Floats
-from seqopt.instances._program import Program, program
 from seqopt.instances.model import Instance
 
 FINEST = 1e9  # parts of the largest amount, where whole numbers are asked

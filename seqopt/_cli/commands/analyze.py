@@ -8,17 +8,15 @@ from typing import Annotated
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.inputs import read_build
-from seqopt._cli.outputs import Output
+from seqopt._cli.outputs import Output, read_build
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.arms._kept import arm_faults
-from seqopt.engines.registry import provenance
+from seqopt.engines.registry import level_notes, provenance
 from seqopt.errors import MechanismError, SeqoptError, SolverError
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.questions import analyze
-from seqopt.responses._faults import _with_faults, analyze_each
-from seqopt.responses.quantities import _steps_in_words
+from seqopt.responses._faults import _with_faults, analyze_each, faults_said
 from seqopt.responses.table import LinearRange, what_was_enough
 from seqopt.sequence.steps import _idle_note
 from seqopt.work import Tell, with_progress
@@ -64,9 +62,9 @@ def run(
     answer = Answer(
         {"units": UNITS, "steps": whole, **provenance(build.engine)},
         scene=scene,
-        failures=_describe_faults(faults, len(steps)),
+        failures=tuple(f"seqopt: {each}" for each in faults_said(faults, len(steps))),
         status=_status_of(faults),
-        notes=(*taken, *remarks.level_notes(words.get("engine"), build.engine)),
+        notes=(*taken, *level_notes(words.get("engine"), build.engine)),
         **outputs.put_table(out, whole, counted),
     )
     if table.empty:
@@ -85,18 +83,6 @@ def run(
     answer = replace(answer, facts=facts, notes=(*notes,))
     over, left = remarks.exceeded(scene, table), within.departures(table)
     return remarks.marked(answer, left, over, unreached=arm_faults(scene, solved))
-
-
-def _describe_faults(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:
-    """Return lines naming the steps that are mechanisms, and those where the solver failed."""
-    out = []
-    for what, kind in (("mechanism", MechanismError), ("solver failed", SolverError)):
-        own = {number: error for number, error in faults.items() if isinstance(error, kind)}
-        if own:
-            where = f"{len(own)} of {steps} steps" if len(own) < steps else "every step"
-            first = str(own[min(own)])
-            out.append(f"seqopt: {what}: {where} ({_steps_in_words([*own])}); {first}")
-    return tuple(out)
 
 
 def _status_of(faults: Mapping[int, SeqoptError]) -> Status:

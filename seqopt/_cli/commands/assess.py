@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 from seqopt._cli import outputs
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.inputs import read_steps
-from seqopt._cli.outputs import Output
+from seqopt._cli.outputs import Output, read_steps
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named

@@ -12,7 +12,7 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import columns, wrapped
 from seqopt._cli.words import Folder
-from seqopt.engines.registry import provenance, simplest
+from seqopt.engines.registry import level_notes, provenance, simplest
 from seqopt.report._folders import comparison_files, figure_notes
 from seqopt.report._questions import compare, own_engine
 from seqopt.report.comparison import Comparison, _printed_largest, format_comparison
@@ -54,7 +54,7 @@ def run(asked: Annotated[Call, ("call", compare)], *, out: Folder = None, progre
     prover = find_prover(computed.network, mortar, progress, asks=asks)
     costs = find_criterion(words.get("criterion") or DEFAULTS["any other"][0])
     result: Comparison = asked(scene=computed, prover=prover, progress=progress)
-    levels = remarks.level_notes(words.get("engine"), simplest(computed))
+    levels = level_notes(words.get("engine"), simplest(computed))
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"criteria": criteria, **provenance(computed)}
     written = output.write(progress, lambda: comparison_files(computed, result, about))
@@ -70,7 +70,7 @@ def run(asked: Annotated[Call, ("call", compare)], *, out: Folder = None, progre
         scene=built,
         notes=(
             *(*levels, *result.enough.lines),
-            *(*remarks.refused(prover), *(figure_notes() if written else ())),
+            *(*prover.notes, *(figure_notes() if written else ())),
         ),
     )
     over = remarks.exceeded(built, *result.tables.values())

@@ -15,7 +15,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt._registry import Later
-from seqopt.engines.registry import engine_mortar
+from seqopt.engines.registry import engine_mortar, level_notes
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
@@ -31,6 +31,7 @@ from seqopt.work import Tell
 from seqopt.workflow import Robust, optimize
 
 FOLDERS = Later("seqopt.report._folders")  # 200 ms, where files are written
+TIMES = Later("seqopt.times._tables")  # where mortar cures
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
 ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
 SAMPLED = ("measure", "count", "seed", "vary")
@@ -105,7 +106,7 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
         },
         "\n".join(_lines(plan, verdicts, over, output)),
         written=written,
-        notes=(*_notes(plan, words.get("engine")), *remarks.refused(prover), *spent()),
+        notes=(*_notes(plan, words.get("engine")), *prover.notes, *spent()),
         failures=(INTERRUPTED,) if early else (),
         status=Status.INTERRUPTED if early else Status.DONE,
         scene=scene,
@@ -157,7 +158,8 @@ def _lines(
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
     yield f"{search}; {outputs.written_to(output.path)}"
-    yield from map(wrapped, remarks.waits_said(plan) if plan.certificate is not None else ())
+    if plan.certificate is not None and plan.standing is not None:
+        yield from map(wrapped, TIMES.waits_said(plan))
     yield from (f"stability, {each}" for each in verdicts.get(plan.title, ()))
     if plan.order:
         yield wrapped(", ".join(map(str, plan.order)), first="order: ")
@@ -170,7 +172,7 @@ def _notes(plan: Plan, engine: str | None) -> Iterator[str]:
     """Yield notes on levels, rules, scales, proof, idle robots and time."""
     problem = _problem(plan)
     scene, criterion = plan.engine.network.scene, problem.criterion.name
-    yield from remarks.level_notes(engine, plan.engine)
+    yield from level_notes(engine, plan.engine)
     if criterion.endswith(OWN):
         yield f"criterion: {criterion}: no fixed method builds this scene to take scales from"
     yield from (f"rules: {each}" for each in problem.moves.relaxed(scene))

@@ -16,7 +16,7 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import Folder
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import engine_mortar
+from seqopt.engines.registry import engine_mortar, level_notes
 from seqopt.plan.front import Front
 from seqopt.plan.solve import graph_of
 from seqopt.questions import pareto
@@ -85,9 +85,9 @@ def run(
 
     written = output.write(progress, files)
     notes = (
-        *remarks.level_notes(words.get("engine"), free.engine),
+        *level_notes(words.get("engine"), free.engine),
         *(f"rules: {each}" for each in free.rules.relaxed(free.engine.network.scene)),
-        *remarks.refused(next(iter(provers.values()))),
+        *next(iter(provers.values())).notes,
         *(figure_notes() if written else ()),
         *([remarks.spent_said(front_spent(front))] if details else []),
     )

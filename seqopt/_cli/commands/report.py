@@ -8,10 +8,11 @@ from typing import Annotated
 
 from seqopt._cli import outputs
 from seqopt._cli.answer import Answer
-from seqopt._cli.inputs import posture_trouble, read_build
+from seqopt._cli.outputs import read_build
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt._files import PAGE
+from seqopt.arms._kept import posture_trouble
 from seqopt.engines.registry import engine_mortar
 from seqopt.plan.build import ShownBuild
 from seqopt.report._questions import own_engine, report

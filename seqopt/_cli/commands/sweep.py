@@ -8,7 +8,6 @@ from itertools import product
 from typing import Annotated
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.arguments import RENAMED
 from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, Option, signature_of
 from seqopt._cli.words import Folder
@@ -94,7 +93,6 @@ def _problems(over: Sequence[str], scene: str) -> dict[str, Mapping[str, str]]:
     differs: dict[str, Sequence[str]] = {"scene": spread(scene)}
     for each in over:
         name, sign, values = each.partition("=")
-        name = RENAMED.get(f"--{name}", name).removeprefix("--")
         if name not in flags or not sign:
             hint = did_you_mean(name, flags)
             raise ProblemError(

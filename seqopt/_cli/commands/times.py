@@ -4,26 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from seqopt._cli import remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.inputs import posture_trouble, read_build
-from seqopt._cli.outputs import Output
+from seqopt._cli.outputs import Output, read_build
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt._files import csv_text
-from seqopt.arms._kept import arm_faults
-from seqopt.engines.registry import USUAL, make_engine
-from seqopt.plan.build import GivenSequence
+from seqopt.arms._kept import arm_faults, posture_trouble
 from seqopt.problem.requirements import _carrying_excesses
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.sequence.steps import _idle_note
-from seqopt.times._build import times
-from seqopt.times._tables import busy_table
+from seqopt.times._build import USUAL_SECONDS, times, with_usual_durations
+from seqopt.times._tables import busy_said, busy_table, waits_said
 from seqopt.work import Tell
-
-_SPENT = ("prepares", "acts", "holds", "idle")  # how a robot spends its time
-USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
 def run(asked: Annotated[Call, ("call", times)], *, out: Folder = None, progress: Tell) -> Answer:
@@ -46,12 +39,11 @@ def run(asked: Annotated[Call, ("call", times)], *, out: Folder = None, progress
     words = {name: word for name, word in asked.words.items() if name != "reassign"}
     output = Output(out, words.get("scene"), words.get("plan"))
     output.require("plan.csv", "times.csv")
-    (given, notes), least = read_build(words, progress), None
-    built = given.engine.network.scene
-    if not all(robot.durations for robot in built.robots):
-        built = built.with_durations(USUAL_SECONDS)
-        given = GivenSequence(make_engine(USUAL, built), given.steps, given.title)
+    (found, notes), least = read_build(words, progress), None
+    given = with_usual_durations(found)
+    if given is not found:
         notes = (f"durations: not known, taken as {USUAL_SECONDS}; --durations says others", *notes)
+    built = given.engine.network.scene
     build = Call(times, words)(scene=given, progress=progress)
     makespan = build.makespan
     if asked.words.get("reassign"):
@@ -73,11 +65,7 @@ def run(asked: Annotated[Call, ("call", times)], *, out: Folder = None, progress
     lines = [f"{built.name}: {len(build.steps)} steps take {makespan:.6g} s"]
     if least is not None:
         lines.append(f"the same grips by other robots: {least:.6g} s, the least")
-    lines += remarks.waits_said(build)
-    for row in busy.to_dict("records"):
-        spent = (f"{what} {row[f'{what}_s']:.6g} s" for what in _SPENT)
-        lines.append(f"  {row['robot']}: {', '.join(spent)}")
-    lines.append(where)
+    lines += (*waits_said(build), *busy_said(busy), where)
     trouble = posture_trouble(built, words.get("cache"), progress)
     cannot = (f"not checked; {trouble}",) if trouble else arm_faults(built, build.steps)
     carried = _carrying_excesses(built, build.steps)

@@ -57,7 +57,10 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     """Return the chart of one scene, with the parts of regret, or of several side by side."""
     across = 1 if width < WIDTH or len(tables) == 1 else 2
     if len(tables) == 1:
-        parts = _ways_shown(tables[0])
+        whole = tables[0].table  # drawn are ways that are not dominated, or usual, the best last
+        own = whole[tables[0].kept | whole["formulation"].isin(USUAL_NAMES)]
+        own = own[np.isfinite(own["regret"].to_numpy(float))]
+        parts: pd.DataFrame = own.sort_values(["regret", "seconds"])[::-1]
         heights = [4.4, 0.6 + 0.28 * len(parts)]
         figure = new_figure(0.7 + sum(heights), width)
         panels = figure.subplots(2, 1, height_ratios=heights)
@@ -146,14 +149,6 @@ def _draw_curves(axes: Axes, table: RegretTable) -> None:
         for shares, line in ((above, "-"), (below, ":")):
             known = [_height(each) if np.isfinite(each) else np.nan for each in shares]
             axes.plot(seconds, known, line, drawstyle="steps-post", **how)
-
-
-def _ways_shown(table: RegretTable) -> pd.DataFrame:
-    """Return the ways whose parts are drawn, the best last: not dominated, or usual."""
-    own = table.table[table.kept | table.table["formulation"].isin(USUAL_NAMES)]
-    by = own[np.isfinite(own["regret"].to_numpy(float))].sort_values(["regret", "seconds"])
-    found: pd.DataFrame = by[::-1]
-    return found
 
 
 def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:

@@ -56,13 +56,6 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     assert load_scene(name) == scene
 
 
-@pytest.mark.parametrize(
-    "path", sorted(DATA.joinpath("scenes").glob("*.json")), ids=lambda p: p.stem
-)
-def test_scenes_that_ship_as_files_are_scene_files(path):
-    assert _parse_scene(path.read_text("utf-8")) == load_scene(path.stem)
-
-
 @pytest.mark.parametrize("name", builtin_scenes())
 def test_bricks_of_built_in_scenes_touch_and_do_not_interpenetrate(name):
     scene = load_scene(name)

@@ -1,23 +1,62 @@
-"""The command ``export``: a plan in a format of others."""
+"""The commands ``import`` and ``export``: scenes of other programs, and plans for them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.inputs import posture_trouble, read_steps
-from seqopt._cli.outputs import Output
+from seqopt._cli.outputs import Output, read_steps
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
-from seqopt._files import write_file
-from seqopt.arms._kept import arm_faults
-from seqopt.exchange._formats import formats
+from seqopt._files import require_apart, write_file
+from seqopt.arms._kept import arm_faults, posture_trouble
+from seqopt.exchange._content import Given
+from seqopt.exchange._formats import formats, readable
 from seqopt.exchange.exports import export
+from seqopt.exchange.imports import import_scene
+from seqopt.network._words import size_line
+from seqopt.scene.scene_file import dump_scene
 from seqopt.work import Tell
 
 
-def run(asked: Annotated[Call, ("call", export)], *, out: File = None, progress: Tell) -> Answer:
+def read(
+    file: Path,
+    *,
+    out: Annotated[Path, ("value", "FILE")],
+    given: Annotated[Call, ("call", Given)],
+    format: Annotated[str | None, ("choices", readable)] = None,  # noqa: A002  # the option's name
+    progress: Tell,
+) -> Answer:
+    """Read an assembly of others, say what was assumed, and write it as a scene.
+
+    It is an assembly of COMPAS, meshes, or a table of boxes.
+
+    Parameters
+    ----------
+    file : pathlib.Path
+        What to read.
+    out : pathlib.Path
+        Scene to write, JSON.
+    format : str, optional
+        What the file is (default: what it looks like).
+
+    Examples
+    --------
+    $ seqopt import wall.obj --unit m --density 2400 --out wall.json
+    $ seqopt import boxes.csv --unit mm --supports 0,1 --out house.json
+    """
+    require_apart([out], [file])
+    progress("reading the file")
+    scene = import_scene(file, format, given(progress=progress))
+    write_file(out, dump_scene(scene))
+    assumed = scene.provenance.splitlines()
+    said = "\n".join([*assumed, f"{size_line(scene)}; written to {out}"])
+    return Answer({"assumed": assumed}, said, scene=scene, written=(out,))
+
+
+def write(asked: Annotated[Call, ("call", export)], *, out: File = None, progress: Tell) -> Answer:
     """Write the plan of a folder, as seqopt optimize --out makes it, in a format of others.
 
     It says what each robot does and where, or is the assembly with its plan.

@@ -4,12 +4,14 @@ With :math:`x_a \in \{0, 1\}` for every arc, one unit flows from node 0 to an en
 :math:`\sum c_a x_a`. A peak is :math:`t` with :math:`t \ge \sum c_a x_a` over the arcs of every
 level where all paths have one arc on each, else over the arcs to every node. A tail is
 :math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is the
-largest weight. When acts end is no part of it.
+largest weight (Rockafellar and Uryasev). When acts end is no part of it.
+
+An instance is a `seqopt.instances.Instance`: a graph with goals and caps.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -17,7 +19,6 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import PEAK, SUM, TAIL
-from seqopt.instances.model import Instance
 
 
 class Program(NamedTuple):
@@ -46,7 +47,7 @@ class _Rows(NamedTuple):
     high: Floats | float = np.inf
 
 
-def as_mps(instance: Instance) -> str:
+def as_mps(instance: Any) -> str:
     """Return the program in free MPS; further goals are rows of type N after the first."""
     found, made_by = program(instance), instance.facts.get("made_by", "")
     lines = [
@@ -74,7 +75,7 @@ def as_mps(instance: Instance) -> str:
     return "\n".join([*lines, "ENDATA", ""])
 
 
-def program(instance: Instance) -> Program:
+def program(instance: Any) -> Program:
     """Return the program of the first goal; further goals are unbounded rows."""
     if instance.asks_time:
         raise ProblemError(f"instance {instance.name}: no program has times; give the .npz")
@@ -105,7 +106,7 @@ def program(instance: Instance) -> Program:
     return Program(names, costs[0], np.where(whole, 1.0, np.inf), whole, matrix, low, high, named)
 
 
-def _flow(instance: Instance, width: int) -> list[_Rows]:
+def _flow(instance: Any, width: int) -> list[_Rows]:
     """Return flow conservation of one unit from node 0 to an end."""
     ones, every, inner = np.ones(instance.arcs), np.arange(instance.arcs), ~instance.ends
     leaves, comes = (
@@ -119,7 +120,7 @@ def _flow(instance: Instance, width: int) -> list[_Rows]:
     return [_Rows(names, out[inner], start, start), _Rows(["ends"], last, 1.0, 1.0)]
 
 
-def _goal(instance: Instance, k: int, first: int, width: int) -> tuple[Floats, list[_Rows]]:
+def _goal(instance: Any, k: int, first: int, width: int) -> tuple[Floats, list[_Rows]]:
     """Return the costs of a goal, and its rows; ``first``: its own variable, of ``width``."""
     goal, arcs = instance.goals[k], instance.arcs
     cost, amounts = np.zeros(width), instance.amounts[:, list(goal.columns)]
