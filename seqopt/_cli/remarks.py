@@ -8,7 +8,8 @@ from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt.engines.interface import Engine
+from seqopt.contact.mortar import EPOXY, _mortar_name, _with_mortar, find_mortar
+from seqopt.engines.interface import Engine, OpeningEngine
 from seqopt.engines.registry import REASONS, USUAL, AutoEngine, _chooser_of
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _prop_faults, overloads
@@ -86,6 +87,16 @@ def refused(prover: BuildProver) -> tuple[str, ...]:
     if prover.mortars and (moves := _settlement_said(prover.network.scene)):
         said.append(moves)
     return tuple(f"stability: {each}" for each in said)
+
+
+def bonded(engine: Engine, mortar: str | None) -> Iterator[str]:
+    """Yield that joints hold another mortar in an engine than the one that verdicts are of."""
+    chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
+    held = EPOXY if chooser is None else chooser.mortar
+    asked = held if mortar is None else find_mortar(mortar)
+    if asked != held and not isinstance(engine, OpeningEngine):
+        said = f"bonded {_with_mortar(_mortar_name(held))} in this engine"
+        yield f"joints: {said}; of steps {_with_mortar(_mortar_name(asked))} verdicts alone speak"
 
 
 def marked(

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
-from seqopt.contact.mortar import _find_curing, _with_friction, find_mortar
+from seqopt.contact.mortar import _find_curing, find_mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import formulation_names
@@ -150,7 +151,8 @@ def demanded(
             usual = "epoxy" if names[0] == "curing" else "dry"
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {usual}, say")
         return None
-    mortar = _with_friction(find_mortar(stands, "stands"), friction)
+    mortar = find_mortar(stands, "stands")
+    mortar = mortar if friction is None else replace(mortar, friction=friction)
     if tilt is not None and not tilt < 90:
         raise ProblemError(f"--tilt {tilt:g}: give an angle from 0 to below 90 degrees")
     cures = _find_curing(" ".join(curing)) if curing else None

@@ -42,6 +42,7 @@ _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 _FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 _SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
 _STORM = 1e6  # wind over the weight
+_SHOWN = 6  # bricks that a message names
 _HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
@@ -468,6 +469,15 @@ def _known(where: str, kind: str, wanted: Iterable[int], known: set[int]) -> Non
     for name in wanted:
         if name not in known:
             raise SceneError(f"{where}: there is no {kind} {name}; known are {sorted(known)}")
+
+
+def hang_free(names: Iterable[int]) -> str:
+    """Describe bricks that no joint ties to the ground; of many, the first ones."""
+    listed = sorted(names)
+    shown = ", ".join(map(str, listed[:_SHOWN]))
+    more = f" and {len(listed) - _SHOWN} more" if len(listed) > _SHOWN else ""
+    hang = f"bricks {shown}{more} hang" if len(listed) > 1 else f"brick {shown} hangs"
+    return f"{hang} free: no joint leads to the ground"
 
 
 Order = tuple[int, ...]

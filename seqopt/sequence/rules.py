@@ -17,7 +17,7 @@ from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
-from seqopt.scene.scene import Scene, _reachable
+from seqopt.scene.scene import Scene, _reachable, hang_free
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, islands, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
@@ -378,11 +378,9 @@ def _require_buildable(network: Network, rules: FreeRules) -> None:
     on = scene.brick_of_node
     kept = {on[p.node].name for p in scene.props if last < len(scene.bricks)}
     for island in [part for part in islands(network, last) if not part & kept][:1]:
-        names = ", ".join(map(str, sorted(island)))
-        hang = f"bricks {names} hang" if len(island) > 1 else f"brick {names} hangs"
         raise StepError(
-            f"scene {scene.name}: {hang} free: no joint leads to the ground; tie it, or let robots "
-            "hold on at the end (--rule ending=held)"
+            f"scene {scene.name}: {hang_free(island)}; tie it, or let robots hold on at the end "
+            "(--rule ending=held)"
         )
 
 

@@ -239,7 +239,7 @@ ODD = {
     ),
     "brick 3: a density of 2.42 kg/m³ is odd": with_own("bricks", 2, density=2.42),
     "gravity is 9810 m/s²": replace(SCENE, gravity=(0.0, 0.0, -9810.0)),
-    "brick 6: no joint leads from it to the ground": replace(
+    "brick 6 hangs free: no joint leads to the ground; tie it": replace(
         SCENE, joints=SCENE.joints[:-1], grounds=SCENE.grounds[:1]
     ),
     "rob1: a reach of 1500 m looks like millimeters": SCENE.with_robots(

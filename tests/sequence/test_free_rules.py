@@ -12,6 +12,8 @@ from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Prop
+from seqopt.scene.scene import hang_free
+from seqopt.scene.scene_file import _find_warnings
 from seqopt.sequence._space import free_space
 from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
 from seqopt.sequence.steps import Site, Step, StepKind
@@ -67,6 +69,18 @@ def test_what_hangs_free_once_robots_let_go_is_named():
         _require_buildable(part, rules[3])
     node = scene.placed[2].nodes[0]
     _require_buildable(build_network(part.scene.with_props(Prop(node=node))), rules[3])
+
+
+def test_scene_method_and_rules_say_alike_that_a_brick_hangs_free():
+    scene = small_arch(4)
+    loose = replace(scene, joints=scene.joints[:-1], grounds=scene.grounds[:1])
+    said = "brick 4 hangs free: no joint leads to the ground"
+    assert f"{said}; tie it" in [*_find_warnings(loose)]
+    with pytest.raises(StepError, match=f"{said}, and no robot is sure to hold on"):
+        seqopt.sequential(loose)
+    with pytest.raises(StepError, match=f"{said}; tie it, or let robots hold on"):
+        _require_buildable(build_network(loose), FreeRules())
+    assert hang_free(range(9, 0, -1)).startswith("bricks 1, 2, 3, 4, 5, 6 and 3 more hang free")
 
 
 def test_further_robots_are_mobile():

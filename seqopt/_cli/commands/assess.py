@@ -16,7 +16,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
 from seqopt._files import csv_text
 from seqopt._registry import Later
-from seqopt.contact.mortar import Mortar, _mortar_name, _with_friction, _with_mortar, find_mortar
+from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.problem.requirements import _carrying_excesses, number_word
@@ -83,7 +83,8 @@ def run(
     own = find_mortar(mortar or "epoxy")
     (given, taken), rows = read_steps(words, progress), list[dict[str, Any]]()
     values = asked.values(scene=given)
-    own = _with_friction(own, values["friction"])
+    rough = values["friction"]
+    own = own if rough is None else replace(own, friction=rough)
     shown = (own,) if mortar else (Mortar(friction=own.friction), own)  # the last one decides
     mortars = {_mortar_name(each): each for each in shown}
     wanted, shared = find_margins(values["margins"] or ()), (None, values["workers"])
