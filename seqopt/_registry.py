@@ -74,7 +74,11 @@ OFFERS = {
     "compute_held_postures": "seqopt.arms._permits",
     "find_path": "seqopt.instances._solve",
     "find_postures": "seqopt.arms.reach",
+    "parse_plan": "seqopt.exchange.schedules",
     "read_measured": "seqopt.exchange.imports",
+    "read_plan": "seqopt.exchange.schedules",
+    "read_schedule": "seqopt.exchange.schedules",
+    "_read_listed": "seqopt.exchange.schedules",
     "hold_alike": "seqopt.arms._permits",
     "permits": "seqopt.arms._permits",
     "with_postures": "seqopt.arms._kept",
@@ -113,6 +117,14 @@ def offered(name: str) -> Any:
         if error.name != ".".join(home.split(".")[:2]):
             raise
         return None
+
+
+def required(name: str) -> Any:
+    """Return the offer of an outer room by name. Raises `ExtraError` if the room is missing."""
+    if (found := offered(name)) is None:
+        home = ".".join(OFFERS[name].split(".")[:2])
+        raise ExtraError(f"{name} is of the room {home}, which is not there: install seqopt anew")
+    return found
 
 
 def display(kind: type, way: str) -> Callable[..., Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pandas as pd
 
 from seqopt._files import parse_json, read_text
-from seqopt._registry import Later, offered
+from seqopt._registry import Later, required
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, find_engine
@@ -37,7 +37,6 @@ from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
@@ -116,8 +115,7 @@ def _read_steps(network: Network, steps: Steps) -> Given:
         raise StepError(
             f"steps {steps!r} do not exist{hint}; give {', '.join(known)}, a file or steps"
         )
-    file = path / "plan.csv" if path.is_dir() else path
-    return Given(network, path.stem, read_plan(network.scene, file))
+    return Given(network, path.stem, required("read_plan")(network.scene, path))
 
 
 def find_build(
@@ -372,7 +370,7 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
     built = scene
     if measured is not None:
-        where = offered("read_measured")(scene, Path(measured))
+        where = required("read_measured")(scene, Path(measured))
         if early := [n for n in where if n in scene.build_order[site.bricks :]]:
             said = f"brick {early[0]} does not stand yet; leave it out"
             raise StepError(f"measured {Path(measured)}: {said}")
@@ -424,7 +422,7 @@ def _planned(
         scene, steps, summary = build.engine.network.scene, build.steps, build.summary()
     else:
         scene, folder = find_scene(build), Path(build)
-        steps = read_plan(scene, folder / "plan.csv")
+        steps = required("read_plan")(scene, folder)
         with suppress(FileError):
             summary = parse_json(read_text(folder / "summary.json"), "summary")
     told: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)

@@ -471,7 +471,7 @@ def _known(where: str, kind: str, wanted: Iterable[int], known: set[int]) -> Non
             raise SceneError(f"{where}: there is no {kind} {name}; known are {sorted(known)}")
 
 
-def hang_free(names: Iterable[int]) -> str:
+def _hang_free(names: Iterable[int]) -> str:
     """Describe bricks that no joint ties to the ground; of many, the first ones."""
     listed = sorted(names)
     shown = ", ".join(map(str, listed[:_SHOWN]))

@@ -27,7 +27,7 @@ from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
 from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Side, Sphere
-from seqopt.scene.scene import _KINDS, Scene, hang_free, in_order
+from seqopt.scene.scene import _KINDS, Scene, _hang_free, in_order
 from seqopt.scene.shape import Polyhedron
 
 BOXES, networkx = Later("seqopt.scene.boxes"), Later("networkx")  # where a file is checked
@@ -74,7 +74,7 @@ def _find_warnings(scene: Scene) -> Iterator[str]:
     )
     tied = networkx.node_connected_component(ties, "ground") if "ground" in ties else ()
     if free := [brick.name for brick in scene.bricks if brick.name not in tied]:
-        yield f"{hang_free(free)}; tie it"
+        yield f"{_hang_free(free)}; tie it"
     bricks = {brick.name: brick for brick in scene.bricks}
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]

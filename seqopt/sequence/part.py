@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from seqopt._files import read_text
-from seqopt._registry import Later
+from seqopt._registry import required
 from seqopt.errors import FileError, StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import short
@@ -18,7 +17,6 @@ from seqopt.sequence.rules import FREE, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Site, Step
 
-FILES = Later("seqopt.sequence.schedule_file")  # where a file is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
 
@@ -155,25 +153,13 @@ def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene
             return _Place(site)
         file, _, step = text.rpartition(":")
         if file and step.isdecimal():
-            return _of_plan(scene, Path(file), int(step))
+            steps = required("_read_listed")(scene, Path(file))
+            site = Site.after(steps, int(step))
+            whole = steps[0].number == 1
+            return _Place(site, tuple(s for s in steps if s.number <= site.step) if whole else ())
         raise StepError(f"give {FORMS}")
     except StepError as error:
         raise StepError(f"{name} {text}: {error}") from None
-
-
-def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
-    """Return the place of a plan after a step; robots that it does not list hold nothing."""
-    file = path / "plan.csv" if path.is_dir() else path
-    columns = read_text(file).partition("\n")[0].split(",")
-    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
-    steps = FILES.read_plan(scene.with_robots(*known) if known else scene, file)
-    where = [known.index(robot) if robot in known else None for robot in scene.robots]
-    if known != [*scene.robots]:
-        steps = tuple(
-            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
-        )
-    done = tuple(each for each in steps if each.number <= step)
-    return _Place(Site.after(steps, step), done if steps[0].number == 1 else ())
 
 
 def find_schedule(
@@ -205,7 +191,7 @@ def find_schedule(
             f"schedule {schedule!r} does not exist{did_you_mean(schedule, (*SCHEDULES, FREE))}; "
             f"give one of {known}"
         )
-    opened: Schedule = FILES.read_schedule(network, path)
+    opened: Schedule = required("read_schedule")(network, path)
     return opened
 
 

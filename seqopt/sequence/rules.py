@@ -17,7 +17,7 @@ from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
 from seqopt.scene.parts import Anywhere, Robot
-from seqopt.scene.scene import Scene, _reachable, hang_free
+from seqopt.scene.scene import Scene, _hang_free, _reachable
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, islands, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
@@ -379,7 +379,7 @@ def _require_buildable(network: Network, rules: FreeRules) -> None:
     kept = {on[p.node].name for p in scene.props if last < len(scene.bricks)}
     for island in [part for part in islands(network, last) if not part & kept][:1]:
         raise StepError(
-            f"scene {scene.name}: {hang_free(island)}; tie it, or let robots hold on at the end "
+            f"scene {scene.name}: {_hang_free(island)}; tie it, or let robots hold on at the end "
             "(--rule ending=held)"
         )
 

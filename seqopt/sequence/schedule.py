@@ -24,7 +24,7 @@ from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene, hang_free
+from seqopt.scene.scene import Scene, _hang_free
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
@@ -305,9 +305,9 @@ def check_support(
         for island in loose(step.bricks):
             if not any(names and names <= island for names in holds):
                 raise StepError(
-                    f"step {step.number} ({step.kind.value}): {hang_free(island)}, and no robot is "
-                    "sure to hold on; place it later, or write a schedule in which one more robot "
-                    "holds it"
+                    f"step {step.number} ({step.kind.value}): {_hang_free(island)}, and no robot "
+                    "is sure to hold on; place it later, or write a schedule in which one more "
+                    "robot holds it"
                 )
 
 

@@ -91,7 +91,7 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     scene = seqopt.load_scene(RIGHT)
     network = seqopt.build_network(scene)
     steps = seqopt.sequential(network)
-    loop = seqopt.sequence.schedule_file.schedule_text(seqopt.three_robot_loop(network))
+    loop = seqopt.exchange.schedules.schedule_text(seqopt.three_robot_loop(network))
     yield "scene", ("s.json", dump_scene(scene).encode(), seqopt.load_scene)
     plan = plan_text(scene, steps).encode()
     yield "plan", ("plan.csv", plan, lambda path: seqopt.read_plan(scene, path))

@@ -12,7 +12,7 @@ from seqopt.errors import StepError
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Prop
-from seqopt.scene.scene import hang_free
+from seqopt.scene.scene import _hang_free
 from seqopt.scene.scene_file import _find_warnings
 from seqopt.sequence._space import free_space
 from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
@@ -80,7 +80,7 @@ def test_scene_method_and_rules_say_alike_that_a_brick_hangs_free():
         seqopt.sequential(loose)
     with pytest.raises(StepError, match=f"{said}; tie it, or let robots hold on"):
         _require_buildable(build_network(loose), FreeRules())
-    assert hang_free(range(9, 0, -1)).startswith("bricks 1, 2, 3, 4, 5, 6 and 3 more hang free")
+    assert _hang_free(range(9, 0, -1)).startswith("bricks 1, 2, 3, 4, 5, 6 and 3 more hang free")
 
 
 def test_further_robots_are_mobile():

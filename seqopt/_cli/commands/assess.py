@@ -14,11 +14,11 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
-from seqopt._files import csv_text
 from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
+from seqopt.exchange._tables import csv_text
 from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words

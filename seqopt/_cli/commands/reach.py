@@ -11,8 +11,8 @@ from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
-from seqopt._files import csv_text
 from seqopt.arms._permits import _listed, reach, reach_described
+from seqopt.exchange._tables import csv_text
 from seqopt.scene.scene import Scene
 from seqopt.work import Tell
 

@@ -10,6 +10,13 @@ import pytest
 import seqopt
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.errors import FileError, ProblemError, SolverError, StepError
+from seqopt.exchange.schedules import (
+    parse_plan,
+    parse_schedule,
+    read_plan,
+    read_schedule,
+    schedule_text,
+)
 from seqopt.graph._spaces import among_orders
 from seqopt.graph.states import build_states
 from seqopt.judge._rule_moves import check_free
@@ -18,13 +25,6 @@ from seqopt.network.network import build_network
 from seqopt.sequence.methods import SCHEDULES, sequential
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import with_robots
-from seqopt.sequence.schedule_file import (
-    parse_plan,
-    parse_schedule,
-    read_plan,
-    read_schedule,
-    schedule_text,
-)
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values
 from tests.builders import small_arch, turned_round
