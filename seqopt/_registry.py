@@ -69,6 +69,8 @@ VIEWS = {
 }
 """Renderers by class of values, with its subclasses, and by name."""
 OFFERS = {
+    "Arm": "seqopt.arms._arm",
+    "Durations": "seqopt.times._durations",
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
@@ -81,6 +83,7 @@ OFFERS = {
     "_read_listed": "seqopt.exchange.schedules",
     "hold_alike": "seqopt.arms._permits",
     "permits": "seqopt.arms._permits",
+    "with_durations": "seqopt.times._durations",
     "with_postures": "seqopt.arms._kept",
     "makespan": "seqopt.times._twin",
     "mortar_waits": "seqopt.times._curing",

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from seqopt._registry import Later, Shown, display
+from seqopt._registry import Later, Shown, display, required
 from seqopt.arrays import Bools, Ints, Vector
 from seqopt.errors import ProblemError, SceneError, did_you_mean
 from seqopt.scene._checks import (
@@ -27,7 +27,6 @@ from seqopt.scene._checks import (
     vector,
     wholes,
 )
-from seqopt.scene.arm import Arm, HeldPostures, from_arms
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
 from seqopt.work import Tell
 
@@ -243,15 +242,15 @@ class Scene(Shown):
             )
         if robot.arm is None:
             return known[robot.reach]
-        until = from_arms("permits")(self).until[self.robots.index(robot)]
+        until = required("permits")(self).until[self.robots.index(robot)]
         return tuple(
             tuple(n for i, n in enumerate(b.nodes) if n in own and until[2 * k + i + 1] > k + 1)
             for k, (b, own) in enumerate(zip(self.placed, known[robot.reach], strict=True))
         )
 
     @property
-    def arms(self) -> tuple[Arm | None, ...]:
-        """The arms of its robots, which must reach what these hold; see `seqopt.arms`."""
+    def arms(self) -> tuple[Any, ...]:
+        """The `seqopt.arms.Arm` of each robot, which must reach what it holds, or None."""
         return tuple(robot.arm for robot in self.robots)
 
     @property
@@ -357,9 +356,8 @@ class Scene(Shown):
         >>> [robot.durations.place for robot in scene.robots]
         [10.0, 10.0, 25.0]
         """
-        names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
-        pairs = zip(self.robots, WORDS.parse_durations(names, own, words), strict=True)
-        return self.with_robots(*(replace(robot, durations=each) for robot, each in pairs))
+        scene: Scene = required("with_durations")(self, *words)
+        return scene
 
     @cached_property
     def grip_kinds(self) -> _GripKinds:
@@ -392,17 +390,15 @@ class Scene(Shown):
         )
 
     @cached_property
-    def held_postures(self) -> HeldPostures | None:
+    def held_postures(self) -> Any:
         """The postures in which arms with compliant joints hold; None if there are no such arms.
 
         They are computed once, and go along to other processes.
         """
-        found: HeldPostures | None = None
-        if self.grip_kinds.arms.any():
-            found = from_arms("compute_held_postures")(self)
-        return found
+        soft = self.grip_kinds.arms.any()
+        return required("compute_held_postures")(self) if soft else None
 
-    def holding(self, postures: HeldPostures) -> Scene:
+    def holding(self, postures: object) -> Scene:
         """Return the same scene with arms that hold in given postures, not those of its own."""
         out = replace(self)
         settle(out, held_postures=postures)
@@ -538,7 +534,7 @@ def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | No
     if not (cache is None or (isinstance(cache, str | Path) and str(cache))):
         raise ProblemError(f"cache is {cache!r}; give the path of a folder")
     if scene.has_arms:
-        from_arms("find_postures")(scene, cache, tell)
+        required("find_postures")(scene, cache, tell)
 
 
 def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
@@ -546,7 +542,7 @@ def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     nodes = tuple(node for brick in scene.within_reach(robot)[:bricks] for node in brick)
     if robot.arm is None:
         return nodes
-    until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
+    until = required("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
 
@@ -561,7 +557,7 @@ class _NoRules:
 
 def _posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
     """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
-    rules: _NoRules = from_arms("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    rules: _NoRules = required("PostureRules")(scene, team) if scene.has_arms else _NoRules()
     return rules
 
 
@@ -571,4 +567,4 @@ def _check_postures(scene: Scene, steps: Sequence[object]) -> None:
     Or if the compliance of their grips is not that of their joints.
     """
     if scene.has_arms:
-        from_arms("check_postures")(scene, steps)
+        required("check_postures")(scene, steps)

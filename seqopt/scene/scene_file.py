@@ -21,11 +21,10 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text, write_file
-from seqopt._registry import Later
+from seqopt._registry import Later, required
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
-from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Side, Sphere
 from seqopt.scene.scene import _KINDS, Scene, _hang_free, in_order
 from seqopt.scene.shape import Polyhedron
@@ -137,7 +136,7 @@ def _depth_along(boxes: Sequence[Brick], point: Vector, axis: Vector) -> float:
 _HEADER = {"format": "seqopt-scene", "version": 1}
 _SAID = ("blocked_nodes", "gravity", "provenance", "closes_with")  # in files by default as well
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
-_WITHIN: dict[str, type] = {"shape": Polyhedron, "arm": Arm, "durations": Durations}
+_OFFERED = {"arm": "Arm", "durations": "Durations"}  # parts that outer rooms describe
 _DATA = resources.files("seqopt").joinpath("data")
 
 
@@ -311,8 +310,9 @@ def _read(kind: type, given: Any, where: str) -> Any:
             reach = _REACHES[one_of(f"{inner}: kind", value.get("kind"), _REACHES)]
             rest = {k: v for k, v in value.items() if k != "kind"}
             own[name] = _read_within(reach, rest, name, where)
-        elif name in _WITHIN and value is not None:
-            own[name] = _read_within(_WITHIN[name], value, name, where)
+        elif name in ("shape", *_OFFERED) and value is not None:
+            part = Polyhedron if name == "shape" else required(_OFFERED[name])
+            own[name] = _read_within(part, value, name, where)
     return kind(**own)
 
 

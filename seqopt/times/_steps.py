@@ -26,11 +26,11 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from seqopt.errors import StepError
-from seqopt.scene.arm import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
 from seqopt.times._curing import Waits
+from seqopt.times._durations import EXAMPLE, Durations
 
 
 @dataclass(frozen=True)

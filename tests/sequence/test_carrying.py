@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 import seqopt
+from seqopt.arms import Arm
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
@@ -13,7 +14,6 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import find_front
 from seqopt.plan.solve import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
-from seqopt.scene.arm import Arm
 from seqopt.sequence.rules import FreeRules, _check_carried, _too_heavy
 from seqopt.sequence.schedule import can_carry, loads
 from seqopt.sequence.steps import StepKind
