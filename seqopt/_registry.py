@@ -74,6 +74,7 @@ OFFERS = {
     "PostureRules": "seqopt.arms._judge",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
+    "find_overlaps": "seqopt.exchange._overlaps",
     "find_path": "seqopt.instances._solve",
     "find_postures": "seqopt.arms.reach",
     "parse_plan": "seqopt.exchange.schedules",

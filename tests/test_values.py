@@ -22,9 +22,9 @@ from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_
 from seqopt.engines.rigid._stacked import StackedOperator
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange._meshes import Surface
+from seqopt.exchange._overlaps import _faces
 from seqopt.exchange.contacts import touching_faces
 from seqopt.network._mechanics import build_statics
-from seqopt.scene.boxes import _faces
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import assess, bonded, load_factor
 from seqopt.stability.limit_analysis import Prover

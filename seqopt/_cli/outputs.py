@@ -9,8 +9,7 @@ from typing import Any
 import pandas as pd
 
 from seqopt._files import PAGE, write_file
-from seqopt.exchange._folders import require_apart, require_folder, write_folder
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text, require_apart, require_folder, write_folder
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
 from seqopt.sequence.rules import FREE

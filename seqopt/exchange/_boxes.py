@@ -9,7 +9,7 @@ import numpy as np
 from seqopt._registry import Later
 from seqopt.errors import SceneError
 from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock
-from seqopt.exchange._tables import read_table
+from seqopt.exchange._files import read_table
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 

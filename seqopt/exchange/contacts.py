@@ -17,9 +17,10 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Given
 from seqopt.exchange._meshes import Repaired, Surface
+from seqopt.exchange._overlaps import _bounds_of, _near_pairs
 from seqopt.responses.quantities import length_text
 from seqopt.scene._checks import as_vector, positive, short, units
-from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields
+from seqopt.scene.boxes import TOLERATED, _spring_fields
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, normal_of, plane_axes, polygon_moments

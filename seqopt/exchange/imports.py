@@ -10,8 +10,8 @@ from seqopt._files import read_text
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
+from seqopt.exchange._files import read_table
 from seqopt.exchange._formats import read_file
-from seqopt.exchange._tables import read_table
 from seqopt.scene._checks import LARGEST_NUMBER, printable, short
 from seqopt.scene.scenarios import SAME
 from seqopt.scene.scene import Scene

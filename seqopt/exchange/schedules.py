@@ -11,7 +11,7 @@ from pathlib import Path
 
 from seqopt._files import read_text
 from seqopt.errors import StepError
-from seqopt.exchange._tables import Row, harmless, read_table
+from seqopt.exchange._files import Row, harmless, read_table
 from seqopt.network.network import Network, network_of
 from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot

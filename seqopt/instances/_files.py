@@ -16,7 +16,7 @@ from seqopt._files import parse_json, read_bytes, write_file
 from seqopt._registry import Later
 from seqopt.arms._archives import Archive
 from seqopt.errors import FileError, ProblemError
-from seqopt.exchange._folders import write_folder
+from seqopt.exchange._files import write_folder
 from seqopt.graph.graph import PEAK, SUM, TAIL, Graph, _Target
 from seqopt.instances._program import as_mps
 from seqopt.instances.model import Instance, _by_goal, _Cap

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.exchange._tables import _FORMULA, csv_text, harmless, plain
+from seqopt.exchange._files import _FORMULA, csv_text, harmless, plain
 from seqopt.exchange.schedules import parse_plan, parse_schedule, schedule_text
 from seqopt.sequence.methods import METHODS, three_robot_loop
 from tests.builders import small_arch

@@ -12,7 +12,7 @@ import pytest
 from seqopt import _files as files
 from seqopt._files import read_text, write_file
 from seqopt.errors import FileError
-from seqopt.exchange._folders import require_apart, require_folder, write_folder
+from seqopt.exchange._files import require_apart, require_folder, write_folder
 from seqopt.work import _answered, _ending
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")

@@ -20,7 +20,7 @@ from seqopt._files import Page
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text
 from seqopt.network.network import build_network
 from seqopt.report import page
 from seqopt.report._pages import OVER, plan_page

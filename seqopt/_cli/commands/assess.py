@@ -18,7 +18,7 @@ from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text
 from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words

@@ -12,7 +12,7 @@ from seqopt._cli.signatures import Call
 from seqopt._files import write_file
 from seqopt.errors import ProblemError
 from seqopt.exchange._content import Given
-from seqopt.exchange._folders import require_apart
+from seqopt.exchange._files import require_apart
 from seqopt.exchange._formats import readable
 from seqopt.exchange.imports import import_scene
 from seqopt.problem.requirements import number_word

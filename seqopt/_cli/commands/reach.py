@@ -12,7 +12,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.arms._permits import _listed, reach, reach_described
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text
 from seqopt.scene.scene import Scene
 from seqopt.work import Tell
 

@@ -14,8 +14,7 @@ from seqopt._cli.signatures import Call, Option, signature_of
 from seqopt._cli.words import Folder
 from seqopt._files import make_folder
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.exchange._folders import write_folder
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text, write_folder
 from seqopt.plan.plan import Plan
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.report.sweep import MOST, spread, sweep

@@ -13,7 +13,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.registry import USUAL, make_engine
-from seqopt.exchange._tables import csv_text
+from seqopt.exchange._files import csv_text
 from seqopt.plan.build import GivenSequence
 from seqopt.problem.requirements import _carrying_excesses
 from seqopt.report._folders import figure_notes, picture_files
