@@ -31,7 +31,6 @@ from seqopt.plan.solve import graph_of
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.requirements import Filter, Limit
 from seqopt.responses import table
-from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, find_postures
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
@@ -370,11 +369,7 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
     built = scene
     if measured is not None:
-        where = required("read_measured")(scene, Path(measured))
-        if early := [n for n in where if n in scene.build_order[site.bricks :]]:
-            said = f"brick {early[0]} does not stand yet; leave it out"
-            raise StepError(f"measured {Path(measured)}: {said}")
-        built = as_built(scene, where)
+        built = required("as_measured")(scene, Path(measured), site.bricks)
     built = find_scene(built, payload=payload, grips=grips, durations=durations, robots=robots)
     begin = _Place(site, done) if isinstance(build, Plan) else f"{build}:{at}"
     changed = {"to": to, "lost": lost, "missing": missing, "direction": told.pop("direction")}

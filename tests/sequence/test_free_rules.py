@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import StepError
+from seqopt.exchange._doubts import find_doubts
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Prop
 from seqopt.scene.scene import _hang_free
-from seqopt.scene.scene_file import _find_warnings
 from seqopt.sequence._space import free_space
 from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
 from seqopt.sequence.steps import Site, Step, StepKind
@@ -75,7 +75,7 @@ def test_scene_method_and_rules_say_alike_that_a_brick_hangs_free():
     scene = small_arch(4)
     loose = replace(scene, joints=scene.joints[:-1], grounds=scene.grounds[:1])
     said = "brick 4 hangs free: no joint leads to the ground"
-    assert f"{said}; tie it" in [*_find_warnings(loose)]
+    assert f"{said}; tie it" in [*find_doubts(loose)]
     with pytest.raises(StepError, match=f"{said}, and no robot is sure to hold on"):
         seqopt.sequential(loose)
     with pytest.raises(StepError, match=f"{said}; tie it, or let robots hold on"):
