@@ -76,7 +76,7 @@ OFFERS = {
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
     "find_doubts": "seqopt.exchange._doubts",
-    "find_overlaps": "seqopt.exchange._overlaps",
+    "find_overlaps": "seqopt.exchange._doubts",
     "find_path": "seqopt.instances._solve",
     "find_postures": "seqopt.arms.reach",
     "parse_plan": "seqopt.exchange.schedules",

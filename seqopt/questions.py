@@ -31,10 +31,11 @@ from seqopt.plan.solve import graph_of
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.requirements import Filter, Limit
 from seqopt.responses import table
-from seqopt.scene.scene import Scene, find_postures
+from seqopt.scene.scene import Scene, find_postures, with_robots
+from seqopt.scene.scene_file import find_scene, plan_folder
 from seqopt.sequence.methods import METHODS
-from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
-from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.part import Part, _Place
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability._steps import assess_steps

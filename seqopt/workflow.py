@@ -34,7 +34,8 @@ from seqopt.problem.requirements import (
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, find_postures
-from seqopt.sequence.part import Part, _find_place, _Place, find_scene, find_schedule, without
+from seqopt.scene.scene_file import find_scene
+from seqopt.sequence.part import Part, _find_place, _Place, find_schedule, without
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Site, StepKind

@@ -21,8 +21,8 @@ from seqopt.engines.rigid._mixed import Solution, mixed_system, share, ungripped
 from seqopt.engines.rigid._operator import OperatorBuilder, ResponseMaps, scene_maps
 from seqopt.engines.rigid._stacked import StackedOperator
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.exchange._doubts import _faces
 from seqopt.exchange._meshes import Surface
-from seqopt.exchange._overlaps import _faces
 from seqopt.exchange.contacts import touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.stability._steps import each_verdict

@@ -12,8 +12,8 @@ from seqopt.errors import ExtraError, SceneError
 from seqopt.plan.build import GivenSequence
 from seqopt.questions import Given, find_steps
 from seqopt.scene.scene import Scene, find_postures
+from seqopt.scene.scene_file import plan_folder
 from seqopt.sequence.methods import METHODS
-from seqopt.sequence.part import plan_folder
 from seqopt.work import Tell
 
 

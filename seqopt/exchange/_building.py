@@ -14,8 +14,8 @@ import numpy as np
 
 from seqopt.errors import SceneError
 from seqopt.exchange._content import GROUND, MOST_CORNERS, UNITS, UPS, Content, FileBlock, Given
+from seqopt.exchange._doubts import find_overlaps
 from seqopt.exchange._meshes import Repaired, repair_shape
-from seqopt.exchange._overlaps import find_overlaps
 from seqopt.exchange.contacts import _find_contacts, _Held, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import block_brick

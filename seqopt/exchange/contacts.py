@@ -16,8 +16,8 @@ from seqopt._registry import Later
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Given
+from seqopt.exchange._doubts import _bounds_of, _near_pairs
 from seqopt.exchange._meshes import Repaired, Surface
-from seqopt.exchange._overlaps import _bounds_of, _near_pairs
 from seqopt.responses.quantities import length_text
 from seqopt.scene._checks import as_vector, positive, short, units
 from seqopt.scene.boxes import TOLERATED, _spring_fields

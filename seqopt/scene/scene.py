@@ -9,14 +9,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from seqopt._registry import Later, Shown, display, required
-from seqopt.arrays import Bools, Ints, Vector
-from seqopt.errors import ProblemError, SceneError, did_you_mean
+from seqopt.arrays import Bools, Floats, Ints, Vector
+from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.scene._checks import (
     check,
     kind_of,
@@ -27,7 +28,7 @@ from seqopt.scene._checks import (
     vector,
     wholes,
 )
-from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
 from seqopt.work import Tell
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ _FAR = 1e9  # of a position from the origin, over the smallest dimension: digits
 _SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
 _STORM = 1e6  # wind over the weight
 _SHOWN = 6  # bricks that a message names
+_ROUNDING = 1e-9  # over a payload, by which a load may exceed it
+MOST_ROBOTS = 5
 _HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
@@ -545,6 +548,57 @@ def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     until = required("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
+
+
+def loads(scene: Scene, robot: Robot) -> Floats:
+    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
+    tool = 0.0 if robot.arm is None else robot.arm.tool_mass
+    gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
+    return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
+
+
+def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
+    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
+    pairs = [(scene, scene.robots[robot]) for scene in scenes]
+    within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
+    return np.asarray(np.all(within, axis=0))
+
+
+def _too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
+    """Describe the robots that cannot carry a brick and their tool in a scene; or empty.
+
+    ``place``: index of the brick in build order, may be negative.
+    """
+    for scene in scenes:
+        brick, pull = scene.placed[place], math.hypot(*scene.gravity) * scene.weight_factor
+        weak = []
+        for robot in (scene.robots[r] for r in robots):
+            tool = 0.0 if robot.arm is None else robot.arm.tool_mass * pull
+            if brick.mass * pull + tool > robot.payload * (1 + _ROUNDING):
+                beside = f", its tool weighs {tool:.1f} N" if tool else ""
+                weak.append(f"{robot.name} ({robot.payload:g} N{beside})")
+        if weak:
+            weight = f"brick {brick.name} weighs {brick.mass * pull:.1f} N"
+            return f"{weight}, more than the payload of {', '.join(weak)}"
+    return ""
+
+
+def with_robots(scene: Scene, count: int) -> Scene:
+    """Return a scene with one to five robots: its own first, then mobile ones.
+
+    Further robots reach every node, have the largest payload of the scene's own, and the compliance
+    and durations of the first of them.
+    """
+    if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: give a number from one to {MOST_ROBOTS}")
+    robots = list(scene.robots[:count])
+    names = {robot.name for robot in robots}
+    fresh = [f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names]
+    payload = max((robot.payload for robot in scene.robots), default=float("nan"))
+    like = robots[0] if robots else Robot(name=fresh[0], payload=payload)
+    more = replace(like, payload=payload, reach=Anywhere(), arm=None)
+    robots += [replace(more, name=name) for name in fresh[: count - len(robots)]]
+    return scene.with_robots(*robots)
 
 
 class _NoRules:

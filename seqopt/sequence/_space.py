@@ -25,10 +25,10 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, can_carry
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
-from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried, islands
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, carried, islands
 from seqopt.sequence.steps import Site, Step, StepKind, _begin_step, check_sequence
 
 

@@ -19,8 +19,9 @@ from seqopt.plan._answers import walk
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
+from seqopt.scene.scene import with_robots
 from seqopt.sequence.methods import SCHEDULES, modified_sequential, three_robot_loop
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import OpenGrip, thin
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict

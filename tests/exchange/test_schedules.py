@@ -22,9 +22,9 @@ from seqopt.graph.states import build_states
 from seqopt.judge._rule_moves import check_free
 from seqopt.judge._schedules import judge_schedule
 from seqopt.network.network import build_network
+from seqopt.scene.scene import with_robots
 from seqopt.sequence.methods import SCHEDULES, sequential
 from seqopt.sequence.part import find_schedule
-from seqopt.sequence.rules import with_robots
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values
 from tests.builders import small_arch, turned_round

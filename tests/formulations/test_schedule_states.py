@@ -19,7 +19,7 @@ from seqopt.exchange.schedules import parse_schedule
 from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.rules import with_robots
+from seqopt.scene.scene import with_robots
 from seqopt.stability.assessment import Verdict, verdict
 from tests.brute_force import ONES, distance
 from tests.builders import small_arch

@@ -28,8 +28,8 @@ from seqopt.exchange._formats import read_file
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene, read_measured
 from seqopt.plan.replan import asked_before
+from seqopt.scene.scene import with_robots
 from seqopt.scene.scene_file import dump_scene
-from seqopt.sequence.rules import with_robots
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
 from tests.documents import BOXES, DOCUMENTS

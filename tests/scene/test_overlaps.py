@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.exchange._overlaps import find_overlaps
+from seqopt.exchange._doubts import find_overlaps
 from seqopt.scene._checks import as_vectors
 from seqopt.scene.boxes import _separations, block_brick, overlapping, require_apart
 from seqopt.scene.parts import Brick

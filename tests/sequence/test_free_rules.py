@@ -13,9 +13,9 @@ from seqopt.exchange._doubts import find_doubts
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Prop
-from seqopt.scene.scene import _hang_free
+from seqopt.scene.scene import _hang_free, with_robots
 from seqopt.sequence._space import free_space
-from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
+from seqopt.sequence.rules import FreeRules, _require_buildable
 from seqopt.sequence.steps import Site, Step, StepKind
 from tests.brute_force import ONES
 from tests.builders import small_arch

@@ -22,7 +22,7 @@ from seqopt.exchange._files import csv_text
 from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.sequence.part import find_scene, plan_folder
+from seqopt.scene.scene_file import find_scene, plan_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict

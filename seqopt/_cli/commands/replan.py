@@ -18,7 +18,7 @@ from seqopt.plan.plan import Plan
 from seqopt.questions import replan
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.quantities import length_text
-from seqopt.sequence.part import plan_folder
+from seqopt.scene.scene_file import plan_folder
 from seqopt.sequence.rules import FREE
 from seqopt.work import Tell
 from seqopt.workflow import optimize

@@ -15,8 +15,7 @@ from seqopt._cli.words import File
 from seqopt.network.network import Network, build_network
 from seqopt.scene.parts import Prop, Robot
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
-from seqopt.sequence.part import find_scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, find_scene, load_scene, save_scene
 from seqopt.work import Tell, with_progress
 
 
