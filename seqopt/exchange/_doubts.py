@@ -16,11 +16,11 @@ import numpy as np
 
 from seqopt._registry import Later
 from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.scene._checks import units
+from seqopt.scene._checks import frames, units
 from seqopt.scene.parts import Ground, Joint, Sphere
 from seqopt.scene.scene import Scene, _hang_free
 from seqopt.scene.scene_file import _find_overlapping
-from seqopt.scene.shape import Polyhedron, _surround, fans, normal_of, plane_axes
+from seqopt.scene.shape import Polyhedron, _surround, fans, normal_of
 from seqopt.work import Progress, Tell
 
 networkx, optimize = Later("networkx"), Later("scipy.optimize")  # slow to import
@@ -161,6 +161,12 @@ def find_overlaps(
         if 2 * radius > deepest:
             x, y, z = over[:3].tolist()
             yield Overlap((i, j), 2 * radius, (x, y, z))
+
+
+def plane_axes(normal: Floats) -> Floats:
+    """Return a right-handed frame (3, 3) whose first row is a unit normal."""
+    side = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
+    return frames(normal, side / np.linalg.norm(side))
 
 
 def _faces(points: Floats, solid: Polyhedron) -> list[_Face]:
