@@ -17,7 +17,6 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Site, Step
 
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
-FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,7 +94,7 @@ def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene
             site = Site.after(steps, int(step))
             whole = steps[0].number == 1
             return _Place(site, tuple(s for s in steps if s.number <= site.step) if whole else ())
-        raise StepError(f"give {FORMS}")
+        raise StepError("give PLAN:STEP (a plan's folder or CSV file), or a number of bricks")
     except StepError as error:
         raise StepError(f"{name} {text}: {error}") from None
 

@@ -389,17 +389,14 @@ def _unbearable(
     ``steps``: checked, may have open grips; ``begin``: where they begin.
     """
     out: dict[int, str] = {}
-    before: tuple[object, ...] = (None,) * len(scenes[0].robots)
-    before = before if begin is None else begin.holds(scenes[0])
+    before: tuple[object, ...] = (begin or Site(0)).holds(scenes[0])
     for step in steps:
-        moves = {StepKind.PLACE: -1, StepKind.REMOVE: 0}  # where the brick is among those placed
-        changed = [
-            r for r, pair in enumerate(zip(before, step.grips, strict=True)) if len({*pair}) > 1
-        ]
-        if step.kind in moves and (
-            why := _too_heavy(scenes, step.bricks + moves[step.kind], changed)
-        ):
-            out[step.number] = why
+        pairs = zip(before, step.grips, strict=True)
+        changed = [robot for robot, (old, new) in enumerate(pairs) if old != new]
+        if step.kind in (StepKind.PLACE, StepKind.REMOVE):
+            brick = step.bricks - (step.kind is StepKind.PLACE)  # its index in build order
+            if why := _too_heavy(scenes, brick, changed):
+                out[step.number] = why
         before = step.grips
     return out
 
