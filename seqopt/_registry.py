@@ -88,6 +88,7 @@ OFFERS = {
     "with_durations": "seqopt.times._durations",
     "with_postures": "seqopt.arms._kept",
     "makespan": "seqopt.times._twin",
+    "mortar_ages": "seqopt.times._steps",
     "mortar_waits": "seqopt.times._curing",
     "reassign": "seqopt.times._tables",
     "step_times": "seqopt.times._steps",
