@@ -5,6 +5,8 @@ from seqopt.contact.mortar import EPOXY as EPOXY
 from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
 from seqopt.exchange.exports import export as export
+from seqopt.exchange.schedules import read_plan as read_plan
+from seqopt.exchange.schedules import read_schedule as read_schedule
 from seqopt.graph.formulation import Formulation as Formulation
 from seqopt.graph.formulation import formulations as formulations
 from seqopt.instances._files import read_instance as read_instance
@@ -42,8 +44,6 @@ from seqopt.sequence.methods import three_robot_loop as three_robot_loop
 from seqopt.sequence.part import Part as Part
 from seqopt.sequence.rules import FreeRules as FreeRules
 from seqopt.sequence.schedule import Schedule as Schedule
-from seqopt.sequence.schedule_file import read_plan as read_plan
-from seqopt.sequence.schedule_file import read_schedule as read_schedule
 from seqopt.sequence.steps import Site as Site
 from seqopt.sequence.steps import Step as Step
 from seqopt.study import CRITERIA as CRITERIA

@@ -69,16 +69,26 @@ VIEWS = {
 }
 """Renderers by class of values, with its subclasses, and by name."""
 OFFERS = {
+    "Arm": "seqopt.arms._arm",
+    "Durations": "seqopt.times._durations",
     "PostureRules": "seqopt.arms._judge",
+    "as_measured": "seqopt.exchange.imports",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
+    "find_doubts": "seqopt.exchange._doubts",
+    "find_overlaps": "seqopt.exchange._doubts",
     "find_path": "seqopt.instances._solve",
     "find_postures": "seqopt.arms.reach",
-    "read_measured": "seqopt.exchange.imports",
+    "parse_plan": "seqopt.exchange.schedules",
+    "read_plan": "seqopt.exchange.schedules",
+    "read_schedule": "seqopt.exchange.schedules",
+    "_read_listed": "seqopt.exchange.schedules",
     "hold_alike": "seqopt.arms._permits",
     "permits": "seqopt.arms._permits",
+    "with_durations": "seqopt.times._durations",
     "with_postures": "seqopt.arms._kept",
     "makespan": "seqopt.times._twin",
+    "mortar_ages": "seqopt.times._steps",
     "mortar_waits": "seqopt.times._curing",
     "reassign": "seqopt.times._tables",
     "step_times": "seqopt.times._steps",
@@ -113,6 +123,14 @@ def offered(name: str) -> Any:
         if error.name != ".".join(home.split(".")[:2]):
             raise
         return None
+
+
+def required(name: str) -> Any:
+    """Return the offer of an outer room by name. Raises `ExtraError` if the room is missing."""
+    if (found := offered(name)) is None:
+        home = ".".join(OFFERS[name].split(".")[:2])
+        raise ExtraError(f"{name} is of the room {home}, which is not there: install seqopt anew")
+    return found
 
 
 def display(kind: type, way: str) -> Callable[..., Any]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pandas as pd
 
 from seqopt._files import parse_json, read_text
-from seqopt._registry import Later, offered
-from seqopt.contact.mortar import Mortar, _with_friction, find_mortar
+from seqopt._registry import Later, required
+from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, find_engine
 from seqopt.errors import (
@@ -31,13 +31,12 @@ from seqopt.plan.solve import graph_of
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.requirements import Filter, Limit
 from seqopt.responses import table
-from seqopt.scene.scenarios import as_built
-from seqopt.scene.scene import Scene, find_postures
+from seqopt.scene.scene import Scene, find_postures, with_robots
+from seqopt.scene.scene_file import find_scene, plan_folder
 from seqopt.sequence.methods import METHODS
-from seqopt.sequence.part import Part, _Place, find_scene, plan_folder
-from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.part import Part, _Place
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability._steps import assess_steps
 from seqopt.stability.assessment import Stability
@@ -116,8 +115,7 @@ def _read_steps(network: Network, steps: Steps) -> Given:
         raise StepError(
             f"steps {steps!r} do not exist{hint}; give {', '.join(known)}, a file or steps"
         )
-    file = path / "plan.csv" if path.is_dir() else path
-    return Given(network, path.stem, read_plan(network.scene, file))
+    return Given(network, path.stem, required("read_plan")(network.scene, path))
 
 
 def find_build(
@@ -243,7 +241,7 @@ def assess(  # noqa: PLR0913  # every question is a word of its own
     ['stands', 'stands', 'stands']
     """
     own = find_mortar(mortar)
-    own = _with_friction(own, friction)
+    own = own if friction is None else replace(own, friction=friction)
     if isinstance(scene, ShownBuild | Path | str) or isinstance(steps, Path | str | None):
         found = find_steps(scene, steps, robots=robots, cache=cache, progress=progress)  # type: ignore[arg-type]
         scene, steps = found.network, found.steps
@@ -372,11 +370,7 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
     built = scene
     if measured is not None:
-        where = offered("read_measured")(scene, Path(measured))
-        if early := [n for n in where if n in scene.build_order[site.bricks :]]:
-            said = f"brick {early[0]} does not stand yet; leave it out"
-            raise StepError(f"measured {Path(measured)}: {said}")
-        built = as_built(scene, where)
+        built = required("as_measured")(scene, Path(measured), site.bricks)
     built = find_scene(built, payload=payload, grips=grips, durations=durations, robots=robots)
     begin = _Place(site, done) if isinstance(build, Plan) else f"{build}:{at}"
     changed = {"to": to, "lost": lost, "missing": missing, "direction": told.pop("direction")}
@@ -424,7 +418,7 @@ def _planned(
         scene, steps, summary = build.engine.network.scene, build.steps, build.summary()
     else:
         scene, folder = find_scene(build), Path(build)
-        steps = read_plan(scene, folder / "plan.csv")
+        steps = required("read_plan")(scene, folder)
         with suppress(FileError):
             summary = parse_json(read_text(folder / "summary.json"), "summary")
     told: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seqopt._registry import Later, offered
+from seqopt._registry import Later, required
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError, did_you_mean
@@ -34,10 +34,11 @@ from seqopt.problem.requirements import (
 from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, find_postures
-from seqopt.sequence.part import Part, _find_place, _Place, find_scene, find_schedule, without
+from seqopt.scene.scene_file import find_scene
+from seqopt.sequence.part import Part, _find_place, _Place, find_schedule, without
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.steps import Site, StepKind
+from seqopt.sequence.steps import Site
 from seqopt.stability.standing import Standing
 from seqopt.study import EQUATIONS, find_criterion
 from seqopt.work import Clock, Tell
@@ -389,7 +390,4 @@ def _with_ages(scene: Scene, begin: _Place, stands: Standing | Mortar | str | No
     cures = isinstance(stands, Standing) and stands.curing is not None
     if begin.site is None or not begin.done or not cures:
         return begin.site
-    waits = offered("mortar_waits")(build_network(scene), stands)
-    times = offered("step_times")(scene, begin.done, waits)
-    ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
-    return replace(begin.site, ages=tuple(times[-1].end - end for end in ends))
+    return replace(begin.site, ages=required("mortar_ages")(scene, begin.done, stands))

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 import seqopt
-from seqopt.scene.arm import Arm
+from seqopt.arms import Arm
 from tests.builders import ROOT
 
 pytestmark = pytest.mark.slow  # what inner rooms import is read every day
@@ -21,9 +21,8 @@ print(json.dumps([plan.objective, [step.grips for step in plan.steps], seqopt.__
 """
 ARMED = """
 import seqopt
-scene = seqopt.load_scene("s.json")
 try:
-    seqopt.optimize(scene, "free")
+    seqopt.load_scene("s.json")
 except seqopt.SeqoptError as error:
     print(type(error).__name__, error)
 """
@@ -63,4 +62,4 @@ def test_arms_without_their_room_are_refused_in_a_line(house):
     robots = [seqopt.Robot(name=r.name, payload=r.payload, arm=arm) for r in scene.robots]
     seqopt.save_scene(scene.with_robots(*robots), house / "s.json")
     (line,) = run(house, ARMED).splitlines()
-    assert line.startswith("ExtraError robots have arms, and the room seqopt.arms")
+    assert line.startswith("ExtraError Arm is of the room seqopt.arms, which is not there")

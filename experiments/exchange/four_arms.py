@@ -29,11 +29,11 @@ from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option,
 from experiments.harness.results import FIGURES
 from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
+from seqopt.arms import Arm
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
 from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import Arms
-from seqopt.scene.arm import Arm
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene

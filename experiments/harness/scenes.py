@@ -10,11 +10,11 @@ import numpy as np
 from seqopt import ArchShape, Network, Scene, arch_scene, build_network, load_scene
 from seqopt.arrays import Ints
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.exchange.schedules import read_plan
 from seqopt.plan.solve import pose, solve
 from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.common import MASONRY
 from seqopt.sequence.methods import METHODS, modified_sequential, three_robot_loop
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 from seqopt.study import EQUATIONS, ROBOTS, SOURCE, printed, published_plan
 

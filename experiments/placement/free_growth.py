@@ -26,7 +26,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import apart, drawn, exponents_by
 from experiments.harness.scenes import scene_named
 from seqopt.report._style import GRAY, dress, look, plain, styled
-from seqopt.sequence.rules import with_robots
+from seqopt.scene.scene import with_robots
 
 ROOM = 1.7e9  # bytes
 

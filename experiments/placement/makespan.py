@@ -24,7 +24,7 @@ import pandas as pd
 import seqopt
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import apart
-from seqopt.sequence.rules import with_robots
+from seqopt.scene.scene import with_robots
 
 DURATIONS = "fetch=30,place=10,approach=10,grip=5,release=5"
 SLOWER = "rob4:fetch=75,approach=25"  # the fourth robot prepares 2.5 times as long

@@ -9,13 +9,13 @@ from typing import Any
 import pandas as pd
 
 from seqopt._cli.signatures import Call
-from seqopt._files import PAGE, csv_text, require_apart, require_folder, write_file, write_folder
+from seqopt._files import PAGE, write_file
 from seqopt.engines.registry import find_engine
+from seqopt.exchange._files import csv_text, require_apart, require_folder, write_folder
 from seqopt.plan.build import GivenSequence
 from seqopt.questions import Given, find_steps
-from seqopt.scene.scene_file import builtin_scenes
+from seqopt.scene.scene_file import builtin_scenes, plan_folder
 from seqopt.sequence.methods import METHODS, SCHEDULES
-from seqopt.sequence.part import plan_folder
 from seqopt.sequence.rules import FREE
 from seqopt.work import Tell
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
+from seqopt.contact.mortar import EPOXY, _mortar_name, _with_mortar, find_mortar
+from seqopt.engines.interface import Engine, OpeningEngine
+from seqopt.engines.registry import AutoEngine, _chooser_of
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
@@ -43,6 +46,16 @@ def spent_said(
         shown = f"{showing['verdicts']:,} verdicts shown, {showing['proven']:,} proven for them"
         parts += [shown, f"{showing['pictures']:,} pictures"]
     return f"spent: {'; '.join(parts)}"
+
+
+def bonded(engine: Engine, mortar: str | None) -> Iterator[str]:
+    """Yield that joints hold another mortar in an engine than the one that verdicts are of."""
+    chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
+    held = EPOXY if chooser is None else chooser.mortar
+    asked = held if mortar is None else find_mortar(mortar)
+    if asked != held and not isinstance(engine, OpeningEngine):
+        said = f"bonded {_with_mortar(_mortar_name(held))} in this engine"
+        yield f"joints: {said}; of steps {_with_mortar(_mortar_name(asked))} verdicts alone speak"
 
 
 def marked(

@@ -15,9 +15,9 @@ from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import formulation_names
 from seqopt.scene.scenarios import MOST
-from seqopt.scene.scene_file import builtin_scenes
+from seqopt.scene.scene_file import builtin_scenes, find_scene
 from seqopt.sequence.methods import METHODS, SCHEDULES
-from seqopt.sequence.part import Part, find_scene
+from seqopt.sequence.part import Part
 from seqopt.stability.assessment import MARGINS
 from seqopt.stability.standing import find_standing
 from seqopt.study import CRITERIA, PUBLISHED

@@ -1,6 +1,6 @@
 """Arms that must reach: postures of robots at nodes, free of bricks, the ground and each other.
 
-A robot of a scene may have an arm, `seqopt.scene.arm.Arm`: a model, a base and a tool. What it
+A robot of a scene may have an arm, an `Arm`: a model, a base and a tool. What it
 reaches is then looked up in a table of postures, which pinocchio and coal compute once (extra
 ``arms``). Schedules, methods, plans and judges ask this table::
 
@@ -23,7 +23,8 @@ from seqopt._registry import later
 from seqopt.arms.reach import find_postures
 
 if TYPE_CHECKING:
+    from seqopt.arms._arm import Arm
     from seqopt.arms._tables import PostureTable
 
-__all__ = ["PostureTable", "find_postures"]
-__getattr__, __dir__ = later(__name__, {"PostureTable": "_tables"})
+__all__ = ["Arm", "PostureTable", "find_postures"]
+__getattr__, __dir__ = later(__name__, {"Arm": "_arm", "PostureTable": "_tables"})

@@ -23,9 +23,9 @@ import numpy as np
 
 from seqopt._files import read_bytes
 from seqopt._registry import Later
+from seqopt.arms._arm import Arm
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, FileError, SceneError
-from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
 
 _Link = ElementTree.Element

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from seqopt.arms._arm import HeldPostures
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
-from seqopt.scene.arm import HeldPostures
 from seqopt.scene.scene import Scene
-from seqopt.sequence.part import find_scene
+from seqopt.scene.scene_file import find_scene
 from seqopt.work import Tell
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from seqopt._registry import Later
+from seqopt.arms._arm import MOST
 from seqopt.arms._collisions import (
     apart_pairs,
     convex,
@@ -22,7 +23,6 @@ from seqopt.arms._collisions import (
 from seqopt.arms._model import SAYS, ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError
-from seqopt.scene.arm import MOST
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 

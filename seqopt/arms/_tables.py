@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from seqopt._files import make_folder, read_bytes, write_file
 from seqopt.arms._archives import Archive
+from seqopt.arms._arm import MOST, Arm, HeldPostures
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import SAYS, UP, ArmModel, arm_model, model_path, shape_notes
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.arm import MOST, Arm, HeldPostures
 from seqopt.scene.scene import Scene
 from seqopt.work import Tell
 

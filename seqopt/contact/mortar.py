@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
@@ -29,6 +29,7 @@ _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 EXAMPLE = "15min, or 5min=0.4,15min=1"
 Points = tuple[tuple[float, float], ...]
 _CUTS = 2  # times that each triangle of a face is cut into four
+ROUGHEST = 10.0  # largest coefficient of friction; more is an angle that was meant
 _STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
 _CHUNK = 1_000_000  # corners of sets whose stress is held at once
 
@@ -40,14 +41,14 @@ class Mortar:
     Parameters
     ----------
     friction : float
-        Coefficient of friction, the tangent of the friction angle.
+        Coefficient of friction, the tangent of the friction angle; up to `ROUGHEST`.
     tensile_strength, cohesion : float
         Pa; zero for blocks laid dry.
 
     Raises
     ------
     SceneError
-        If a number is negative or not finite.
+        If a number is negative or not finite, or friction is an angle in degrees.
 
     Examples
     --------
@@ -64,10 +65,12 @@ class Mortar:
     def __post_init__(self) -> None:
         check(self, "mortar", friction=not_negative)
         check(self, "mortar", tensile_strength=not_negative, cohesion=not_negative)
+        if (given := self.friction) > ROUGHEST:
+            slope = f"; {given:g}° is {math.tan(math.radians(given)):.3g}" * (given < 90)
+            raise SceneError(f"friction {given:g}: give a coefficient up to {ROUGHEST:g}{slope}")
 
 
 _FRICTION = math.tan(math.radians(25.0))
-_ROUGHEST = 2.0  # more is an angle that was meant
 DRY = Mortar(friction=_FRICTION)
 """Blocks laid dry: compression and friction alone.
 
@@ -95,19 +98,6 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     slides, pulled = mortar.friction - other.friction, other.tensile_strength
     rough = slides == 0 or (slides > 0 and not pulled)
     return rough and mortar.tensile_strength >= pulled and mortar.cohesion >= other.cohesion
-
-
-def _with_friction(mortar: Mortar, friction: float | None) -> Mortar:
-    """Return a mortar with another coefficient of friction, if one is given.
-
-    A `SceneError` says of more than `_ROUGHEST` what an angle of as many degrees is.
-    """
-    if friction is None:
-        return mortar
-    if friction > _ROUGHEST:
-        slope = f"; {friction:g}° is {math.tan(math.radians(friction)):.3g}" * (friction < 90)
-        raise SceneError(f"friction {friction:g}: give a coefficient up to {_ROUGHEST:g}{slope}")
-    return replace(mortar, friction=friction)
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seqopt._registry import required
 from seqopt.contact.mortar import EPOXY, ElasticLimits, Mortar, find_elastic_limits, find_mortar
 from seqopt.engines.interface import (
     Engine,
@@ -30,7 +31,6 @@ from seqopt.engines.interface import (
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.network import Network, build_network, network_of
-from seqopt.scene.arm import from_arms
 from seqopt.scene.scene import Scene
 
 REASONS = {
@@ -149,7 +149,7 @@ def engine_for(engine: Engine, scene: Scene) -> Engine:
         )
     nominal = engine.network.scene
     if nominal.grip_kinds.arms.any():
-        scene = from_arms("hold_alike")(nominal, scene)
+        scene = required("hold_alike")(nominal, scene)
     return replace(recipe, scene=scene).make()
 
 

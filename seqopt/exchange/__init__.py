@@ -13,7 +13,8 @@ needed:
 >>> print(scene.provenance.splitlines()[1])
 a table of boxes: no faces
 
-Plans are written as tasks of robots, and for COMPAS (`export`).
+Plans are written as tasks of robots, and for COMPAS (`export`). Tables of steps are read as plans
+and as schedules with open grips (`read_plan`, `read_schedule`).
 """
 
 from typing import TYPE_CHECKING
@@ -26,8 +27,19 @@ if TYPE_CHECKING:
     from seqopt.exchange._tasks import plan_tasks
     from seqopt.exchange.exports import export
     from seqopt.exchange.imports import import_scene
+    from seqopt.exchange.schedules import read_plan, read_schedule
 
-__all__ = ["Content", "FileBlock", "Format", "Given", "export", "import_scene", "plan_tasks"]
+__all__ = [
+    "Content",
+    "FileBlock",
+    "Format",
+    "Given",
+    "export",
+    "import_scene",
+    "plan_tasks",
+    "read_plan",
+    "read_schedule",
+]
 __getattr__, __dir__ = later(
     __name__,
     {
@@ -38,5 +50,7 @@ __getattr__, __dir__ = later(
         "export": "exports",
         "import_scene": "imports",
         "plan_tasks": "_tasks",
+        "read_plan": "schedules",
+        "read_schedule": "schedules",
     },
 )

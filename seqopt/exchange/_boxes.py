@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from seqopt._files import read_table
 from seqopt._registry import Later
 from seqopt.errors import SceneError
 from seqopt.exchange._content import LARGEST, MOST_BLOCKS, Content, FileBlock
+from seqopt.exchange._files import read_table
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 

@@ -14,10 +14,11 @@ import numpy as np
 
 from seqopt.errors import SceneError
 from seqopt.exchange._content import GROUND, MOST_CORNERS, UNITS, UPS, Content, FileBlock, Given
+from seqopt.exchange._doubts import find_overlaps
 from seqopt.exchange._meshes import Repaired, repair_shape
 from seqopt.exchange.contacts import _find_contacts, _Held, _widest_gap, face_ground, face_joint
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
-from seqopt.scene.boxes import _find_overlaps, block_brick
+from seqopt.scene.boxes import block_brick
 from seqopt.scene.library.common import MASONRY, JointLaw, _mobile_robots, a_law
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
@@ -246,7 +247,7 @@ def _interpenetrating(
     most = min(_widest_gap(way, bricks) for way in (given, replace(given, gap=None)))
     solids = {i: b.solid for i, b in enumerate(blocks) if isinstance(b.solid, Polyhedron)}
     places = [*solids]
-    found = _find_overlaps([*solids.values()], [most] * len(solids), given.progress)
+    found = find_overlaps([*solids.values()], [most] * len(solids), given.progress)
     pairs = (((places[o.pair[0]], places[o.pair[1]]), o) for o in islice(found, _MOST_OVERLAPS))
     overlaps = sorted(
         ((pair, each) for pair, each in pairs if {*pair} & bricks.keys()),

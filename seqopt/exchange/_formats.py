@@ -21,7 +21,7 @@ from seqopt.exchange._compas_models import (
 )
 from seqopt.exchange._compas_shapes import kind, payload
 from seqopt.exchange._content import Content, assembly_json
-from seqopt.exchange._mesh_files import read_obj, write_obj
+from seqopt.exchange._meshes import read_obj, write_obj
 from seqopt.exchange._tasks import tasks_csv, tasks_in_postures, tasks_json
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene

@@ -16,11 +16,11 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text
 from seqopt._registry import Later
 from seqopt.arms._kept import PlanPostures, plan_postures
 from seqopt.errors import ExtraError, SceneError
 from seqopt.exchange._compas_shapes import compas_frame, mesh_data
+from seqopt.exchange._files import csv_text
 from seqopt.exchange._grip_frames import Frame, Held, hold
 from seqopt.scene._checks import as_vector, positive
 from seqopt.scene.boxes import vertices_of

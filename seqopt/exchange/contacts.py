@@ -16,13 +16,14 @@ from seqopt._registry import Later
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Given
+from seqopt.exchange._doubts import _bounds_of, _near_pairs, plane_axes
 from seqopt.exchange._meshes import Repaired, Surface
 from seqopt.responses.quantities import length_text
 from seqopt.scene._checks import as_vector, positive, short, units
-from seqopt.scene.boxes import TOLERATED, _bounds_of, _near_pairs, _spring_fields
+from seqopt.scene.boxes import TOLERATED, _spring_fields
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.shape import Polyhedron, normal_of, plane_axes, polygon_moments
+from seqopt.scene.shape import Polyhedron, normal_of, polygon_moments
 from seqopt.work import Progress, Tell
 
 SHAPELY = Later("shapely")  # an extra

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from seqopt._files import read_table, read_text
+import numpy as np
+
+from seqopt._files import read_text
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
+from seqopt.exchange._files import read_table
 from seqopt.exchange._formats import read_file
 from seqopt.scene._checks import LARGEST_NUMBER, printable, short
-from seqopt.scene.scenarios import SAME
+from seqopt.scene.scenarios import _moved
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
 
+SAME = 1e-9  # m; closer than this a brick is where it was planned
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
 
 
@@ -97,3 +103,41 @@ def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
             raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
         out[int(values[0])] = tuple(values[1:])
     return out
+
+
+def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:
+    """Return a scene whose bricks are where they were measured, m, all others as planned.
+
+    A brick takes its nodes and loads with it. A joint goes half as far as its two bricks together,
+    the end of a brick on the ground half as far as the brick; what is fixed to the ground stays.
+    Raises `SceneError` if there is no such brick, or it was measured farther off than it is long.
+    """
+    known = {brick.name: brick for brick in scene.bricks}
+    steps = {name: np.zeros(3) for name in known}
+    for name, position in measured.items():
+        if name not in known:
+            raise SceneError(f"measured brick {name}: scene {scene.name} has no such brick")
+        steps[name] = np.subtract(position, known[name].position)
+        off, most = float(np.linalg.norm(steps[name])), max(known[name].dimensions)
+        if not off <= most:
+            raise SceneError(
+                f"measured brick {name}: it is {off:.3g} m from where it was planned, more "
+                f"than its {most:.3g} m; give positions of centroids in the frame of the scene, m"
+            )
+    joints = (_moved(j, 0.5 * (steps[j.bricks[0]] + steps[j.bricks[1]])) for j in scene.joints)
+    return replace(
+        scene,
+        bricks=tuple(_moved(brick, steps[brick.name]) for brick in scene.bricks),
+        joints=tuple(joints),
+        grounds=tuple(_moved(ground, 0.5 * steps[ground.brick]) for ground in scene.grounds),
+        loads=tuple(_moved(load, steps[load.brick]) for load in scene.loads),
+    )
+
+
+def as_measured(scene: Scene, path: Path, standing: int) -> Scene:
+    """Return a scene whose first ``standing`` bricks are where a file says, as of `as_built`."""
+    where = read_measured(scene, path)
+    if early := [n for n in where if n in scene.build_order[standing:]]:
+        said = f"brick {early[0]} does not stand yet; leave it out"
+        raise StepError(f"measured {path}: {said}")
+    return as_built(scene, where)

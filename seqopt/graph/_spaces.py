@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.mortar import ROUGHEST
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._budgets import within_budgets
@@ -28,7 +29,6 @@ from seqopt.scene.scene import Order, Scene
 from seqopt.sequence import _space as free_space
 from seqopt.sequence._space import FreeSpace, ScheduleSpace, sort_entries
 from seqopt.sequence.steps import Step, _begin_step, check_sequence
-from seqopt.stability.assessment import ROUGHEST
 from seqopt.stability.standing import Standing, slack
 
 

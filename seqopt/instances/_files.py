@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import parse_json, read_bytes, write_file, write_folder
+from seqopt._files import parse_json, read_bytes, write_file
 from seqopt._registry import Later
 from seqopt.arms._archives import Archive
 from seqopt.errors import FileError, ProblemError, plugins
+from seqopt.exchange._files import write_folder
 from seqopt.graph.graph import Graph, _Target
 from seqopt.instances.model import Instance, _by_goal, _Cap
 from seqopt.times._archive import STORED, read_acts

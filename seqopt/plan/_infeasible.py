@@ -37,9 +37,9 @@ from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
+from seqopt.scene.scene import loads
 from seqopt.sequence.rules import FREE, _RuleBook
 from seqopt.sequence.rules import _unbearable as too_heavy_steps
-from seqopt.sequence.schedule import loads
 from seqopt.stability.standing import Standing
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from seqopt._registry import Later
+from seqopt._registry import Later, required
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
@@ -26,7 +26,6 @@ from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
 from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, require_parts
 from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
-from seqopt.scene.arm import from_arms
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
 from seqopt.sequence.schedule import Schedule
@@ -253,7 +252,7 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
 
         plan = solved(asked)
         if asked.scene.has_arms:
-            plan = from_arms("with_postures")(asked, plan, solved)
+            plan = required("with_postures")(asked, plan, solved)
         moved = None if plan.certificate is None else plan.certificate.moved
         each = (most_moved(own, plan.steps) for own in plan.graph.scenarios or (plan.engine,))
         return replace(plan, moved=moved or max(each, key=lambda moved: moved.share))

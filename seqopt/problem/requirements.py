@@ -53,9 +53,9 @@ from seqopt.responses.quantities import (
 from seqopt.responses.scales import _response_along
 from seqopt.responses.table import _Columns, _steps_in_table
 from seqopt.scene._checks import short
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, loads
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule import Schedule, carried, loads
+from seqopt.sequence.schedule import Schedule, carried
 from seqopt.sequence.steps import AnyStep
 
 LARGEST = 1e100  # number: products of larger ones overflow

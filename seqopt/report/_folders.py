@@ -9,10 +9,11 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt._files import PAGE, csv_text
+from seqopt._files import PAGE
 from seqopt._registry import Later
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
+from seqopt.exchange._files import csv_text
 from seqopt.exchange._tasks import plan_tasks, tasks_csv, tasks_in_postures, tasks_json
 from seqopt.plan._spent import Spent, spent_on
 from seqopt.plan.build import ShownBuild

@@ -15,6 +15,7 @@ from seqopt._registry import display
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError
+from seqopt.exchange.schedules import read_plan
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.problem.requirements import overloads
@@ -34,7 +35,6 @@ from seqopt.responses.table import (
 )
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
 

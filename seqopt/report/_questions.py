@@ -19,7 +19,7 @@ from seqopt.report._regret._measure import check_reference
 from seqopt.report.comparison import Comparison
 from seqopt.report.comparison import compare as compare_builds
 from seqopt.scene.scene import Scene, find_postures
-from seqopt.sequence.part import find_scene
+from seqopt.scene.scene_file import find_scene
 from seqopt.stability.failure_map import BuildProver, find_prover
 from seqopt.study import find_criterion
 from seqopt.work import Tell

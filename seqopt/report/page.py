@@ -21,10 +21,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from seqopt._files import csv_text
 from seqopt.arms._model import shape_notes
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ProblemError
+from seqopt.exchange._files import csv_text
 from seqopt.network.network import Network
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data

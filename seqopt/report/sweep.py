@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text, write_file
+from seqopt._files import write_file
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SeqoptError, SolverError
+from seqopt.exchange._files import csv_text
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene

@@ -14,14 +14,12 @@ An arch of your own from the angles of its bricks, with robots beside it that re
 [True, True, True]
 
 Make any other scene from `Brick`, `Joint`, `Ground` and `Robot`, and `Load` where something else
-than its weight loads it; `seqopt.save_scene` writes it to a file. `Durations` say how long a robot
-takes.
+than its weight loads it; `seqopt.save_scene` writes it to a file.
 """
 
 from typing import TYPE_CHECKING
 
 from seqopt._registry import later
-from seqopt.scene.arm import Durations
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = [
     "ArchShape",
     "Brick",
-    "Durations",
     "Ground",
     "Joint",
     "Load",

@@ -1,4 +1,4 @@
-"""Words for grips, props, payloads and durations, as Python and the command line take them."""
+"""Words for grips, props and payloads, as Python and the command line take them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import in_words, short
-from seqopt.scene.arm import EXAMPLE, NAMES, Durations
 from seqopt.scene.parts import Prop, Robot
 
 _PROPS = (
@@ -77,31 +76,3 @@ def parse_payloads(robots: Sequence[Robot], payloads: Sequence[float | str]) -> 
         )
         found = [replace(robot, **own) if name in ("", robot.name) else robot for robot in found]
     return found
-
-
-def parse_durations(
-    names: Sequence[str], given: Sequence[Durations | None], texts: Sequence[str]
-) -> tuple[Durations | None, ...]:
-    """Return the durations of robots as words say, those before being for all, or as given.
-
-    ``names``: of the robots; ``given``: their own; ``texts``: as `EXAMPLE`, for one robot with its
-    name and a colon before.
-    """
-    out = list(given)
-    for text in texts:
-        name, colon, words = text.partition(":") if ":" in text else ("", "", text)
-        if colon and name not in names:
-            hint = did_you_mean(name, names)
-            raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys(NAMES, (float, f"a number of s, as {EXAMPLE}"))
-        said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
-        for index in (i for i, robot in enumerate(names) if robot == name or not colon):
-            before = out[index]
-            lacking = [each for each in NAMES if each not in said and each != "speed"]
-            if before is None and lacking:
-                raise SceneError(
-                    f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
-                    f"all, as {EXAMPLE}"
-                )
-            out[index] = Durations(**said) if before is None else replace(before, **said)
-    return tuple(out)

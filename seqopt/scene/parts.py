@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from numbers import Real
 from operator import mul
+from typing import Any
 
 import numpy as np
 
+from seqopt._registry import required
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
@@ -37,7 +39,6 @@ from seqopt.scene._checks import (
     whole,
     wholes,
 )
-from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.shape import Polyhedron, _convex_polygon
 
 
@@ -413,9 +414,9 @@ class Robot(Terse):
     rotational_stiffness : float or Vector, optional
         Of the grip against rotation of the node, N m/rad: one number, or three about the scene's
         axes. By default a grip lets its node turn.
-    arm : Arm, optional
-        Its arm, which must reach a node as well; see `seqopt.arms`.
-    durations : Durations, optional
+    arm : seqopt.arms.Arm, optional
+        Its arm, which must reach a node as well.
+    durations : seqopt.times.Durations, optional
         How long it takes for what it does; by default that is not known.
 
     Examples
@@ -433,8 +434,8 @@ class Robot(Terse):
     reach: Reach = field(default_factory=Anywhere)
     stiffness: float | Vector | None = None
     rotational_stiffness: float | Vector | None = None
-    arm: Arm | None = field(default=None, repr=False)
-    durations: Durations | None = None
+    arm: Any = field(default=None, repr=False)
+    durations: Any = None
 
     def __post_init__(self) -> None:
         if not printable("robot", self.name):
@@ -451,8 +452,8 @@ class Robot(Terse):
             payload=partial(positive, unit="N"),
             stiffness=_each_shift,
             rotational_stiffness=partial(_each_way, unit="N m/rad, or none if its node may turn"),
-            arm=partial(kind_of, kind=Arm),
-            durations=partial(kind_of, kind=Durations),
+            arm=lambda where, arm: kind_of(where, arm, required("Arm")),
+            durations=lambda where, given: kind_of(where, given, required("Durations")),
         )
 
 

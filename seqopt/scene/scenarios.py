@@ -8,7 +8,7 @@ mean the same in all scenarios. Wind varies as weights do.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, TypeVar
@@ -76,36 +76,6 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
     )
 
 
-def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:
-    """Return a scene whose bricks are where they were measured, m, all others as planned.
-
-    A brick takes its nodes and loads with it. A joint goes half as far as its two bricks together,
-    the end of a brick on the ground half as far as the brick; what is fixed to the ground stays.
-    Raises `SceneError` if there is no such brick, or it was measured farther off than it is long.
-    """
-    known = {brick.name: brick for brick in scene.bricks}
-    steps = {name: np.zeros(3) for name in known}
-    for name, position in measured.items():
-        if name not in known:
-            raise SceneError(f"measured brick {name}: scene {scene.name} has no such brick")
-        steps[name] = np.subtract(position, known[name].position)
-        off, most = float(np.linalg.norm(steps[name])), max(known[name].dimensions)
-        if not off <= most:
-            raise SceneError(
-                f"measured brick {name}: it is {off:.3g} m from where it was planned, more "
-                f"than its {most:.3g} m; give positions of centroids in the frame of the scene, m"
-            )
-    joints = (_moved(j, 0.5 * (steps[j.bricks[0]] + steps[j.bricks[1]])) for j in scene.joints)
-    return replace(
-        scene,
-        bricks=tuple(_moved(brick, steps[brick.name]) for brick in scene.bricks),
-        joints=tuple(joints),
-        grounds=tuple(_moved(ground, 0.5 * steps[ground.brick]) for ground in scene.grounds),
-        loads=tuple(_moved(load, steps[load.brick]) for load in scene.loads),
-    )
-
-
-SAME = 1e-9  # m; closer than this a brick is where it was planned
 MOST = 100_000  # scenarios; more are a slip of the finger
 _LARGEST_FACTOR = 1e6
 _ALIKE = (1.0, 1.0)  # factors of what does not vary

@@ -9,14 +9,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
+from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from seqopt._registry import Later, Shown, display
-from seqopt.arrays import Bools, Ints, Vector
-from seqopt.errors import ProblemError, SceneError, did_you_mean
+from seqopt._registry import Later, Shown, display, required
+from seqopt.arrays import Bools, Floats, Ints, Vector
+from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.scene._checks import (
     check,
     kind_of,
@@ -27,8 +28,7 @@ from seqopt.scene._checks import (
     vector,
     wholes,
 )
-from seqopt.scene.arm import Arm, HeldPostures, from_arms
-from seqopt.scene.parts import Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Prop, Reach, Robot, _GripKinds
 from seqopt.work import Tell
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 _FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 _SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
 _STORM = 1e6  # wind over the weight
+_SHOWN = 6  # bricks that a message names
+_ROUNDING = 1e-9  # over a payload, by which a load may exceed it
+MOST_ROBOTS = 5
 _HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
@@ -242,15 +245,15 @@ class Scene(Shown):
             )
         if robot.arm is None:
             return known[robot.reach]
-        until = from_arms("permits")(self).until[self.robots.index(robot)]
+        until = required("permits")(self).until[self.robots.index(robot)]
         return tuple(
             tuple(n for i, n in enumerate(b.nodes) if n in own and until[2 * k + i + 1] > k + 1)
             for k, (b, own) in enumerate(zip(self.placed, known[robot.reach], strict=True))
         )
 
     @property
-    def arms(self) -> tuple[Arm | None, ...]:
-        """The arms of its robots, which must reach what these hold; see `seqopt.arms`."""
+    def arms(self) -> tuple[Any, ...]:
+        """The `seqopt.arms.Arm` of each robot, which must reach what it holds, or None."""
         return tuple(robot.arm for robot in self.robots)
 
     @property
@@ -356,9 +359,8 @@ class Scene(Shown):
         >>> [robot.durations.place for robot in scene.robots]
         [10.0, 10.0, 25.0]
         """
-        names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
-        pairs = zip(self.robots, WORDS.parse_durations(names, own, words), strict=True)
-        return self.with_robots(*(replace(robot, durations=each) for robot, each in pairs))
+        scene: Scene = required("with_durations")(self, *words)
+        return scene
 
     @cached_property
     def grip_kinds(self) -> _GripKinds:
@@ -391,17 +393,15 @@ class Scene(Shown):
         )
 
     @cached_property
-    def held_postures(self) -> HeldPostures | None:
+    def held_postures(self) -> Any:
         """The postures in which arms with compliant joints hold; None if there are no such arms.
 
         They are computed once, and go along to other processes.
         """
-        found: HeldPostures | None = None
-        if self.grip_kinds.arms.any():
-            found = from_arms("compute_held_postures")(self)
-        return found
+        soft = self.grip_kinds.arms.any()
+        return required("compute_held_postures")(self) if soft else None
 
-    def holding(self, postures: HeldPostures) -> Scene:
+    def holding(self, postures: object) -> Scene:
         """Return the same scene with arms that hold in given postures, not those of its own."""
         out = replace(self)
         settle(out, held_postures=postures)
@@ -470,6 +470,15 @@ def _known(where: str, kind: str, wanted: Iterable[int], known: set[int]) -> Non
             raise SceneError(f"{where}: there is no {kind} {name}; known are {sorted(known)}")
 
 
+def _hang_free(names: Iterable[int]) -> str:
+    """Describe bricks that no joint ties to the ground; of many, the first ones."""
+    listed = sorted(names)
+    shown = ", ".join(map(str, listed[:_SHOWN]))
+    more = f" and {len(listed) - _SHOWN} more" if len(listed) > _SHOWN else ""
+    hang = f"bricks {shown}{more} hang" if len(listed) > 1 else f"brick {shown} hangs"
+    return f"{hang} free: no joint leads to the ground"
+
+
 Order = tuple[int, ...]
 _PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
@@ -528,7 +537,7 @@ def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | No
     if not (cache is None or (isinstance(cache, str | Path) and str(cache))):
         raise ProblemError(f"cache is {cache!r}; give the path of a folder")
     if scene.has_arms:
-        from_arms("find_postures")(scene, cache, tell)
+        required("find_postures")(scene, cache, tell)
 
 
 def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
@@ -536,9 +545,60 @@ def _reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     nodes = tuple(node for brick in scene.within_reach(robot)[:bricks] for node in brick)
     if robot.arm is None:
         return nodes
-    until = from_arms("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
+    until = required("permits")(scene).until[scene.robots.index(robot)]  # ends, by place
     place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
+
+
+def loads(scene: Scene, robot: Robot) -> Floats:
+    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
+    tool = 0.0 if robot.arm is None else robot.arm.tool_mass
+    gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
+    return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
+
+
+def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
+    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
+    pairs = [(scene, scene.robots[robot]) for scene in scenes]
+    within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
+    return np.asarray(np.all(within, axis=0))
+
+
+def _too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
+    """Describe the robots that cannot carry a brick and their tool in a scene; or empty.
+
+    ``place``: index of the brick in build order, may be negative.
+    """
+    for scene in scenes:
+        brick, pull = scene.placed[place], math.hypot(*scene.gravity) * scene.weight_factor
+        weak = []
+        for robot in (scene.robots[r] for r in robots):
+            tool = 0.0 if robot.arm is None else robot.arm.tool_mass * pull
+            if brick.mass * pull + tool > robot.payload * (1 + _ROUNDING):
+                beside = f", its tool weighs {tool:.1f} N" if tool else ""
+                weak.append(f"{robot.name} ({robot.payload:g} N{beside})")
+        if weak:
+            weight = f"brick {brick.name} weighs {brick.mass * pull:.1f} N"
+            return f"{weight}, more than the payload of {', '.join(weak)}"
+    return ""
+
+
+def with_robots(scene: Scene, count: int) -> Scene:
+    """Return a scene with one to five robots: its own first, then mobile ones.
+
+    Further robots reach every node, have the largest payload of the scene's own, and the compliance
+    and durations of the first of them.
+    """
+    if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: give a number from one to {MOST_ROBOTS}")
+    robots = list(scene.robots[:count])
+    names = {robot.name for robot in robots}
+    fresh = [f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names]
+    payload = max((robot.payload for robot in scene.robots), default=float("nan"))
+    like = robots[0] if robots else Robot(name=fresh[0], payload=payload)
+    more = replace(like, payload=payload, reach=Anywhere(), arm=None)
+    robots += [replace(more, name=name) for name in fresh[: count - len(robots)]]
+    return scene.with_robots(*robots)
 
 
 class _NoRules:
@@ -551,7 +611,7 @@ class _NoRules:
 
 def _posture_rules(scene: Scene, team: Sequence[int]) -> _NoRules:
     """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
-    rules: _NoRules = from_arms("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    rules: _NoRules = required("PostureRules")(scene, team) if scene.has_arms else _NoRules()
     return rules
 
 
@@ -561,4 +621,4 @@ def _check_postures(scene: Scene, steps: Sequence[object]) -> None:
     Or if the compliance of their grips is not that of their joints.
     """
     if scene.has_arms:
-        from_arms("check_postures")(scene, steps)
+        required("check_postures")(scene, steps)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import json
-import math
 import os
 import shlex
 import warnings
@@ -21,78 +20,27 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import parse_json, read_text, write_file
-from seqopt._registry import Later
+from seqopt._registry import Later, offered, required
 from seqopt.arrays import Vector
-from seqopt.errors import SceneError, SceneWarning, did_you_mean
+from seqopt.errors import FileError, SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import Reader, in_words, one_of, rows, short
-from seqopt.scene.arm import Arm, Durations
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Side, Sphere
-from seqopt.scene.scene import _KINDS, Scene, in_order
+from seqopt.scene.scene import _KINDS, Scene, in_order, with_robots
 from seqopt.scene.shape import Polyhedron
 
-BOXES, networkx = Later("seqopt.scene.boxes"), Later("networkx")  # where a file is checked
+BOXES = Later("seqopt.scene.boxes")  # where a file is checked
 _LEVEL = 1e-12  # slope of a line to a face, beyond which it meets it
 _SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
-_FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
-_THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
-_DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
-_FAR_REACH = 100.0  # m; of a robot
-_PULL = 100.0  # m/s²; ten times that of the earth
-
-
-def _find_odd_units(scene: Scene) -> Iterator[str]:
-    """Yield a line on gravity, lengths and densities that seem to be in other units."""
-    pull = math.hypot(*scene.gravity)
-    if pull > _PULL:
-        yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
-    large = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
-    odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
-    for found, said in (
-        (large, "dimensions of {0.dimensions} m look like millimeters; give meters"),
-        (odd, "a density of {0.density:g} kg/m³ is odd; check its unit"),
-    ):
-        if found:
-            more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            yield f"brick {found[0].name}{more}: {said.format(found[0])}"
-    far = [r for r in scene.robots if isinstance(r.reach, Sphere) and r.reach.radius > _FAR_REACH]
-    for robot in far[:1]:
-        yield f"{robot.name}: a reach of {robot.reach.radius:g} m looks like millimeters"  # type: ignore[union-attr]
-    moved = [end for end in scene.grounds if end.movement and max(map(abs, end.movement)) > 1]
-    for end in moved[:1]:
-        yield f"{end.label}: a movement of {max(map(abs, end.movement or ())):g} is m or rad"
-
-
-def _find_warnings(scene: Scene) -> Iterator[str]:
-    """Yield warnings about a scene, one line each; most scenes have none."""
-    yield from _find_odd_units(scene)
-    yield from _find_overlapping(scene, across_joints=True)
-    ties = networkx.Graph(
-        [joint.bricks for joint in scene.joints if any(joint.translational_stiffness)]
-    )
-    ties.add_edges_from(
-        ("ground", end.brick) for end in scene.grounds if any(end.translational_stiffness)
-    )
-    tied = networkx.node_connected_component(ties, "ground") if "ground" in ties else ()
-    if free := [brick.name for brick in scene.bricks if brick.name not in tied]:
-        more_of_them = f" and {len(free) - 1} more" if len(free) > 1 else ""
-        yield f"brick {free[0]}{more_of_them}: no joint leads from it to the ground; tie it"
-    bricks = {brick.name: brick for brick in scene.bricks}
-    springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
-    placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
-    placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
-    for label, position, end in placed:
-        at = np.abs(bricks[end].frame @ np.subtract(position, bricks[end].position))
-        away = np.linalg.norm(np.maximum(at - 0.5 * np.array(bricks[end].dimensions), 0.0))
-        if away > _FAR_AWAY * max(bricks[end].dimensions):
-            yield f"{label}: it lies {away:.4g} m from brick {end}"
 
 
 def warn_of(scene: Scene, name: str, *, made: bool = False) -> None:
     """Give a `SceneWarning` for each thing that looks wrong in a scene.
 
-    ``made``: whether it was made of words, so that only its units can be wrong.
+    ``made``: whether it was made of words, so that only its units can be wrong. What looks wrong is
+    known to `seqopt.exchange`.
     """
-    for doubt in _find_odd_units(scene) if made else _find_warnings(scene):
+    find = offered("find_doubts")
+    for doubt in find(scene, made=made) if find else ():
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
@@ -138,7 +86,7 @@ def _depth_along(boxes: Sequence[Brick], point: Vector, axis: Vector) -> float:
 _HEADER = {"format": "seqopt-scene", "version": 1}
 _SAID = ("blocked_nodes", "gravity", "provenance", "closes_with")  # in files by default as well
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
-_WITHIN: dict[str, type] = {"shape": Polyhedron, "arm": Arm, "durations": Durations}
+_OFFERED = {"arm": "Arm", "durations": "Durations"}  # parts that outer rooms describe
 _DATA = resources.files("seqopt").joinpath("data")
 
 
@@ -312,8 +260,9 @@ def _read(kind: type, given: Any, where: str) -> Any:
             reach = _REACHES[one_of(f"{inner}: kind", value.get("kind"), _REACHES)]
             rest = {k: v for k, v in value.items() if k != "kind"}
             own[name] = _read_within(reach, rest, name, where)
-        elif name in _WITHIN and value is not None:
-            own[name] = _read_within(_WITHIN[name], value, name, where)
+        elif name in ("shape", *_OFFERED) and value is not None:
+            part = Polyhedron if name == "shape" else required(_OFFERED[name])
+            own[name] = _read_within(part, value, name, where)
     return kind(**own)
 
 
@@ -380,3 +329,64 @@ def save_scene(scene: Scene, path: Path) -> None:
     """
     folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
     write_file(path, dump_scene(scene, folder))
+
+
+def plan_folder(scene: object) -> Path | None:
+    """Return the folder of a plan that stands for its scene; None of another scene."""
+    if not isinstance(scene, str | Path) or not (path := Path(scene)).is_dir():
+        return None
+    for name in ("scene.json", "plan.csv"):
+        if not (path / name).is_file():
+            raise FileError(f"{path}: it has no {name}; give a folder of seqopt optimize --out")
+    return path
+
+
+def find_scene(
+    scene: Scene | Path | str,
+    *,
+    order: str | Sequence[int] | None = None,
+    grips: str | None = None,
+    props: str | None = None,
+    payload: Sequence[float | str] = (),
+    durations: Sequence[str] = (),
+    robots: int | Sequence[str] | None = None,
+) -> Scene:
+    """Return a scene by its name, words, file or a plan's folder, with what is other than it says.
+
+    Parameters
+    ----------
+    scene : Scene, str or pathlib.Path
+        A built-in scene, a JSON file, a plan's folder, or words as arch:span=2,rise=0.8 (default:
+        arch25); seqopt scene --list shows all.
+    order : str or sequence of int, optional
+        In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
+        ends at once), or the names of all bricks, as 1..12,25..13.
+    grips : str, optional
+        How stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
+        three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
+        turning.
+    props : str, optional
+        Nodes that props hold beside the robots, if not as the scene says, until the finished
+        structure is let go: as 13,27, or every, one at each brick as centering has; N/m after a
+        colon if they are not rigid, as every:1e6; then push for such as only push up, and
+        capacity=N.
+    payload : sequence of float or str, optional
+        What every robot may carry, N, if not as the scene says; of one robot with its name before,
+        as rob1=250.
+    durations : sequence of str, optional
+        How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
+        of ways between grips); that is to bring the next brick, to place it, to come to one that
+        stands, to grip it, to let go; who is free fetches and approaches while others act; of one
+        robot with its name before, as rob3:fetch=75 (default: as the scene says).
+    robots : int or sequence of str, optional
+        How many there are: those of the scene first, further ones reach every node.
+    """
+    if not isinstance(scene, Scene):
+        folder = plan_folder(scene)
+        scene = load_scene(scene if folder is None else folder / "scene.json")
+    scene = in_order(scene, order)
+    scene = scene.with_payloads(*payload) if payload else scene
+    scene = with_robots(scene, robots) if isinstance(robots, int) else scene
+    scene = scene if props is None else scene.with_props(props)
+    scene = scene if grips is None else scene.with_grips(grips)
+    return scene.with_durations(*durations) if durations else scene

@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints, Vector, frozen
 from seqopt.errors import SceneError
-from seqopt.scene._checks import frames, rows, settle, short, vector, wholes
+from seqopt.scene._checks import rows, settle, short, vector, wholes
 
 _Corner = TypeVar("_Corner")
 _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
@@ -154,12 +154,6 @@ def normal_of(corners: Floats) -> Floats:
     """Return the normal (3,) of a polygon (m, 3), as long as twice its area, m²."""
     spokes = corners - corners[0]
     return np.asarray(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))
-
-
-def plane_axes(normal: Floats) -> Floats:
-    """Return a right-handed frame (3, 3) whose first row is a unit normal."""
-    side = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
-    return frames(normal, side / np.linalg.norm(side))
 
 
 def bend(corners: Floats) -> float:

@@ -18,26 +18,15 @@ its scene. A schedule is a sequence in which some grips are still to be chosen.
 Loops of two robots and of more are in `seqopt.sequence.methods`.
 """
 
-from typing import TYPE_CHECKING
-
-from seqopt._registry import later
 from seqopt.sequence.methods import cantilever, modified_sequential, sequential, three_robot_loop
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-
-if TYPE_CHECKING:
-    from seqopt.sequence.schedule_file import read_plan, read_schedule
 
 __all__ = [
     "Schedule",
     "Step",
     "cantilever",
     "modified_sequential",
-    "read_plan",
-    "read_schedule",
     "sequential",
     "three_robot_loop",
 ]
-__getattr__, __dir__ = later(
-    __name__, {"read_plan": "schedule_file", "read_schedule": "schedule_file"}
-)

@@ -20,15 +20,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seqopt._registry import required
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
 from seqopt.errors import SolverError, StepError
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
-from seqopt.scene.arm import from_arms
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, can_carry
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
-from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, can_carry, carried, islands
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, carried, islands
 from seqopt.sequence.steps import Site, Step, StepKind, _begin_step, check_sequence
 
 
@@ -134,7 +134,7 @@ class StateRows(Terse):
             return np.ones(len(states), dtype=bool)
         held = np.zeros((len(states), len(scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return np.asarray(from_arms("permits")(scene).allowed(bricks, held))
+        return np.asarray(required("permits")(scene).allowed(bricks, held))
 
     def codes(self, states: Ints) -> Ints:
         """Return a code (n,) per state (n, c), unique in its level."""

@@ -6,82 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from seqopt._files import read_text
-from seqopt._registry import Later
-from seqopt.errors import FileError, StepError, did_you_mean
+from seqopt._registry import required
+from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, in_order
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import SCHEDULES, robot_loop
-from seqopt.sequence.rules import FREE, with_robots
+from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Site, Step
 
-FILES = Later("seqopt.sequence.schedule_file")  # where a file is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
-FORMS = "PLAN:STEP (a plan's folder or CSV file), or a number of bricks"
-
-
-def plan_folder(scene: object) -> Path | None:
-    """Return the folder of a plan that stands for its scene; None of another scene."""
-    if not isinstance(scene, str | Path) or not (path := Path(scene)).is_dir():
-        return None
-    for name in ("scene.json", "plan.csv"):
-        if not (path / name).is_file():
-            raise FileError(f"{path}: it has no {name}; give a folder of seqopt optimize --out")
-    return path
-
-
-def find_scene(
-    scene: Scene | Path | str,
-    *,
-    order: str | Sequence[int] | None = None,
-    grips: str | None = None,
-    props: str | None = None,
-    payload: Sequence[float | str] = (),
-    durations: Sequence[str] = (),
-    robots: int | Sequence[str] | None = None,
-) -> Scene:
-    """Return a scene by its name, words, file or a plan's folder, with what is other than it says.
-
-    Parameters
-    ----------
-    scene : Scene, str or pathlib.Path
-        A built-in scene, a JSON file, a plan's folder, or words as arch:span=2,rise=0.8 (default:
-        arch25); seqopt scene --list shows all.
-    order : str or sequence of int, optional
-        In which order bricks are placed, if not in the scene's own: reversed, ends (from all ground
-        ends at once), or the names of all bricks, as 1..12,25..13.
-    grips : str, optional
-        How stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, or
-        three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks from
-        turning.
-    props : str, optional
-        Nodes that props hold beside the robots, if not as the scene says, until the finished
-        structure is let go: as 13,27, or every, one at each brick as centering has; N/m after a
-        colon if they are not rigid, as every:1e6; then push for such as only push up, and
-        capacity=N.
-    payload : sequence of float or str, optional
-        What every robot may carry, N, if not as the scene says; of one robot with its name before,
-        as rob1=250.
-    durations : sequence of str, optional
-        How long robots take, s: fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s,
-        of ways between grips); that is to bring the next brick, to place it, to come to one that
-        stands, to grip it, to let go; who is free fetches and approaches while others act; of one
-        robot with its name before, as rob3:fetch=75 (default: as the scene says).
-    robots : int or sequence of str, optional
-        How many there are: those of the scene first, further ones reach every node.
-    """
-    if not isinstance(scene, Scene):
-        folder = plan_folder(scene)
-        scene = load_scene(scene if folder is None else folder / "scene.json")
-    scene = in_order(scene, order)
-    scene = scene.with_payloads(*payload) if payload else scene
-    scene = with_robots(scene, robots) if isinstance(robots, int) else scene
-    scene = scene if props is None else scene.with_props(props)
-    scene = scene if grips is None else scene.with_grips(grips)
-    return scene.with_durations(*durations) if durations else scene
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,25 +90,13 @@ def _find_place(given: Site | _Place | int | str | None, name: str, scene: Scene
             return _Place(site)
         file, _, step = text.rpartition(":")
         if file and step.isdecimal():
-            return _of_plan(scene, Path(file), int(step))
-        raise StepError(f"give {FORMS}")
+            steps = required("_read_listed")(scene, Path(file))
+            site = Site.after(steps, int(step))
+            whole = steps[0].number == 1
+            return _Place(site, tuple(s for s in steps if s.number <= site.step) if whole else ())
+        raise StepError("give PLAN:STEP (a plan's folder or CSV file), or a number of bricks")
     except StepError as error:
         raise StepError(f"{name} {text}: {error}") from None
-
-
-def _of_plan(scene: Scene, path: Path, step: int) -> _Place:
-    """Return the place of a plan after a step; robots that it does not list hold nothing."""
-    file = path / "plan.csv" if path.is_dir() else path
-    columns = read_text(file).partition("\n")[0].split(",")
-    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
-    steps = FILES.read_plan(scene.with_robots(*known) if known else scene, file)
-    where = [known.index(robot) if robot in known else None for robot in scene.robots]
-    if known != [*scene.robots]:
-        steps = tuple(
-            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
-        )
-    done = tuple(each for each in steps if each.number <= step)
-    return _Place(Site.after(steps, step), done if steps[0].number == 1 else ())
 
 
 def find_schedule(
@@ -205,7 +128,7 @@ def find_schedule(
             f"schedule {schedule!r} does not exist{did_you_mean(schedule, (*SCHEDULES, FREE))}; "
             f"give one of {known}"
         )
-    opened: Schedule = FILES.read_schedule(network, path)
+    opened: Schedule = required("read_schedule")(network, path)
     return opened
 
 

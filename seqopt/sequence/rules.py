@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from math import hypot
 from numbers import Integral
 from typing import ClassVar
 
@@ -16,14 +15,12 @@ from seqopt.arrays import Bools, Ints
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
-from seqopt.scene.parts import Anywhere, Robot
-from seqopt.scene.scene import Scene, _reachable
+from seqopt.scene.scene import MOST_ROBOTS, Scene, _hang_free, _reachable, _too_heavy
 from seqopt.sequence.methods import placing_node
 from seqopt.sequence.schedule import Move, OpenStep, _near_nodes, islands, near_rule
 from seqopt.sequence.steps import AnyStep, Grips, Site, Step, StepKind
 
 FREE = "free"  # the schedule that is no list of steps
-MOST_ROBOTS = 5
 
 
 class Newest(Enum):
@@ -378,49 +375,10 @@ def _require_buildable(network: Network, rules: FreeRules) -> None:
     on = scene.brick_of_node
     kept = {on[p.node].name for p in scene.props if last < len(scene.bricks)}
     for island in [part for part in islands(network, last) if not part & kept][:1]:
-        names = ", ".join(map(str, sorted(island)))
-        hang = f"bricks {names} hang" if len(island) > 1 else f"brick {names} hangs"
         raise StepError(
-            f"scene {scene.name}: {hang} free: no joint leads to the ground; tie it, or let robots "
-            "hold on at the end (--rule ending=held)"
+            f"scene {scene.name}: {_hang_free(island)}; tie it, or let robots hold on at the end "
+            "(--rule ending=held)"
         )
-
-
-def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with one to five robots: its own first, then mobile ones.
-
-    Further robots reach every node, have the largest payload of the scene's own, and the compliance
-    and durations of the first of them.
-    """
-    if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: give a number from one to {MOST_ROBOTS}")
-    robots = list(scene.robots[:count])
-    names = {robot.name for robot in robots}
-    fresh = [f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names]
-    payload = max((robot.payload for robot in scene.robots), default=float("nan"))
-    like = robots[0] if robots else Robot(name=fresh[0], payload=payload)
-    more = replace(like, payload=payload, reach=Anywhere(), arm=None)
-    robots += [replace(more, name=name) for name in fresh[: count - len(robots)]]
-    return scene.with_robots(*robots)
-
-
-def _too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
-    """Describe the robots that cannot carry a brick and their tool in a scene; or empty.
-
-    ``place``: index of the brick in build order, may be negative.
-    """
-    for scene in scenes:
-        brick, pull = scene.placed[place], hypot(*scene.gravity) * scene.weight_factor
-        weak = []
-        for robot in (scene.robots[r] for r in robots):
-            tool = 0.0 if robot.arm is None else robot.arm.tool_mass * pull
-            if brick.mass * pull + tool > robot.payload * (1 + 1e-9):
-                beside = f", its tool weighs {tool:.1f} N" if tool else ""
-                weak.append(f"{robot.name} ({robot.payload:g} N{beside})")
-        if weak:
-            weight = f"brick {brick.name} weighs {brick.mass * pull:.1f} N"
-            return f"{weight}, more than the payload of {', '.join(weak)}"
-    return ""
 
 
 def _unbearable(
@@ -431,17 +389,14 @@ def _unbearable(
     ``steps``: checked, may have open grips; ``begin``: where they begin.
     """
     out: dict[int, str] = {}
-    before: tuple[object, ...] = (None,) * len(scenes[0].robots)
-    before = before if begin is None else begin.holds(scenes[0])
+    before: tuple[object, ...] = (begin or Site(0)).holds(scenes[0])
     for step in steps:
-        moves = {StepKind.PLACE: -1, StepKind.REMOVE: 0}  # where the brick is among those placed
-        changed = [
-            r for r, pair in enumerate(zip(before, step.grips, strict=True)) if len({*pair}) > 1
-        ]
-        if step.kind in moves and (
-            why := _too_heavy(scenes, step.bricks + moves[step.kind], changed)
-        ):
-            out[step.number] = why
+        pairs = zip(before, step.grips, strict=True)
+        changed = [robot for robot, (old, new) in enumerate(pairs) if old != new]
+        if step.kind in (StepKind.PLACE, StepKind.REMOVE):
+            brick = step.bricks - (step.kind is StepKind.PLACE)  # its index in build order
+            if why := _too_heavy(scenes, brick, changed):
+                out[step.number] = why
         before = step.grips
     return out
 

@@ -20,11 +20,10 @@ import networkx as nx
 import numpy as np
 
 from seqopt._registry import Shown, display
-from seqopt.arrays import Bools, Floats, Ints, Terse
+from seqopt.arrays import Bools, Ints, Terse
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.network.network import Network, PartKind
-from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, _hang_free
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
@@ -304,16 +303,11 @@ def check_support(
             holds.append({on[node].name for node in nodes if node is not None})
         for island in loose(step.bricks):
             if not any(names and names <= island for names in holds):
-                listed = ", ".join(map(str, sorted(island)))
-                hang = f"bricks {listed} hang" if len(island) > 1 else f"brick {listed} hangs"
                 raise StepError(
-                    f"step {step.number} ({step.kind.value}): {hang} free: no joint "
-                    "connects to the ground and no robot is sure to hold on; place it later, or "
-                    "write a schedule in which one more robot holds it"
+                    f"step {step.number} ({step.kind.value}): {_hang_free(island)}, and no robot "
+                    "is sure to hold on; place it later, or write a schedule in which one more "
+                    "robot holds it"
                 )
-
-
-_ROUNDING = 1e-9  # over a payload, by which a load may exceed it
 
 
 class _Carried(NamedTuple):
@@ -335,17 +329,3 @@ def carried(scene: Scene, steps: Sequence[AnyStep]) -> Iterator[_Carried]:
             yield _Carried(hold.first, hold.robot, hold.places)
         if (step := removals.get(hold.last)) is not None:  # in which nobody else lets go
             yield _Carried(step.number, hold.robot, scene.placed[step.bricks].name)
-
-
-def loads(scene: Scene, robot: Robot) -> Floats:
-    """Return the load of a robot with every brick in build order, its tool included, (B,), N."""
-    tool = 0.0 if robot.arm is None else robot.arm.tool_mass
-    gravity = scene.weight_factor * float(np.linalg.norm(scene.gravity))
-    return gravity * (np.array([brick.mass for brick in scene.placed]) + tool)
-
-
-def can_carry(scenes: Sequence[Scene], robot: int) -> Bools:
-    """Return whether a robot can carry each brick in build order in all scenes, (B,)."""
-    pairs = [(scene, scene.robots[robot]) for scene in scenes]
-    within = [loads(scene, own) <= own.payload * (1 + _ROUNDING) for scene, own in pairs]
-    return np.asarray(np.all(within, axis=0))

@@ -27,11 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from seqopt.arrays import Bools, Floats, Ints, Vector
 from seqopt.contact.assembly import Assembly, _applied_rows, _prop_grips, bare_assembly
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import ROUGHEST, Mortar, find_mortar
 from seqopt.errors import GripError, SceneError, plugins
 from seqopt.network.network import Network, network_of
 from seqopt.scene.scene import Scene
-from seqopt.stability.assessment import FALLS, OPEN, ROUGHEST, STANDS, bonded
+from seqopt.stability.assessment import FALLS, OPEN, STANDS, bonded
 from seqopt.stability.limit_analysis import (
     CAP,
     DIRECTIONS,

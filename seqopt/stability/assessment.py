@@ -17,7 +17,7 @@ import numpy as np
 from seqopt._registry import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly, step_assembly
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import ROUGHEST, Mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network, network_of
 from seqopt.scene.scene import Scene
@@ -43,7 +43,6 @@ STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
 CONES = "cone program"  # what proves a verdict where nothing simpler does
 MARGINS = ("bond", "friction", "tilt", "payload")
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
-ROUGHEST = 10.0  # largest coefficient of friction that is tried
 _LITTLE = 1e-3  # friction that holds nothing but what is jammed
 _FRICTION_STEP = 1e-4  # to which the least one is found
 _ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest

@@ -21,6 +21,7 @@ from seqopt.contact.assembly import Assembly, PartialAssemblies
 from seqopt.contact.mortar import (
     DRY,
     EPOXY,
+    ROUGHEST,
     Mortar,
     _is_as_strong,
     _mortar_name,
@@ -441,7 +442,7 @@ def _cure(case: _Case, what: str) -> float:
             if not np.isfinite(own):
                 return float(own)
             needed = max(needed, float(own) * (1 + _SURE))
-            mortar = replace(case.mortar, friction=needed)
+            mortar = replace(case.mortar, friction=min(needed, ROUGHEST))
             if what == "bond":  # at least what there is
                 bond = bond_mortar(needed, case.mortar.friction)
                 tension = max(bond.tensile_strength, case.mortar.tensile_strength)

@@ -25,7 +25,7 @@ from importlib import resources
 
 import pandas as pd
 
-from seqopt._registry import Later
+from seqopt._registry import required
 from seqopt.contact.mortar import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.criteria import (
@@ -56,7 +56,6 @@ __all__ = [
     "published_plan",
 ]
 
-FILES = Later("seqopt.sequence.schedule_file")  # where the plan is asked for
 
 ROBOTS = (
     Robot(name="rob1", payload=392.4, reach=Side(toward=(0.0, 1.0, 0.0), point=(0.0, -0.075, 0.0))),
@@ -213,7 +212,7 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
     """
     source = resources.files("seqopt").joinpath("data/paper/three_robot_plan.csv")
     text = source.read_text(encoding="utf-8")
-    steps: tuple[Step, ...] = FILES.parse_plan(scene, text, "published three-robot plan")
+    steps: tuple[Step, ...] = required("parse_plan")(scene, text, "published three-robot plan")
     return steps
 
 

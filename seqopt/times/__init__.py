@@ -19,6 +19,7 @@ from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.times._build import times
+    from seqopt.times._durations import Durations
 
-__all__ = ["times"]
-__getattr__, __dir__ = later(__name__, {"times": "_build"})
+__all__ = ["Durations", "times"]
+__getattr__, __dir__ = later(__name__, {"Durations": "_durations", "times": "_build"})

@@ -26,11 +26,13 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from seqopt.errors import StepError
-from seqopt.scene.arm import EXAMPLE, Durations
+from seqopt.network.network import build_network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import AnyStep, Site, Step, StepKind, _begin_step, check_sequence
-from seqopt.times._curing import Waits
+from seqopt.stability.standing import Standing
+from seqopt.times._curing import Waits, mortar_waits
+from seqopt.times._durations import EXAMPLE, Durations
 
 
 @dataclass(frozen=True)
@@ -240,6 +242,13 @@ def _undominated(labels: Iterable[_Label], *, parks: bool) -> list[_Label]:
             own.append(times)
             out.append(label)
     return out
+
+
+def mortar_ages(scene: Scene, done: Sequence[Step], standing: Standing) -> tuple[float, ...]:
+    """Return how long mortar has cured when steps have ended, by the bricks that they placed, s."""
+    times = step_times(scene, done, mortar_waits(build_network(scene), standing))
+    ends = [t.end for t, s in zip(times, done, strict=True) if s.kind is StepKind.PLACE]
+    return tuple(times[-1].end - end for end in ends)
 
 
 def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:

@@ -10,8 +10,8 @@ from seqopt.errors import StepError
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import force_column
-from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import Hold, can_carry, carried
+from seqopt.scene.scene import Scene, can_carry
+from seqopt.sequence.schedule import Hold, carried
 from seqopt.sequence.steps import Site, Step, idle_robots
 from seqopt.times._curing import Waits
 from seqopt.times._steps import reassigned_steps, step_times

@@ -27,21 +27,13 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
-from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
@@ -98,25 +90,6 @@ def _one_thread() -> AbstractContextManager[object]:
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
     return limited
-
-
-@cache
-def _cores() -> int:
-    """Return on how many cores this process may work: one where it is one of several workers."""
-    if parent_process() is not None:
-        return 1
-    known = getattr(os, "sched_getaffinity", None)  # not everywhere
-    return len(known(0)) if known else os.cpu_count() or 1
-
-
-def _in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
-    """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
-    first, *others = tasks
-    if not others:
-        return [function(first)]
-    with ThreadPoolExecutor(len(others)) as pool:
-        found = pool.map(function, others)  # begun at once
-        return [function(first), *found]
 
 
 @cache

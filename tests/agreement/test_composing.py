@@ -12,16 +12,17 @@ import seqopt
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
+from seqopt.exchange.schedules import parse_schedule
 from seqopt.graph.formulation import FormulationKind, Watch, find_formulation
 from seqopt.graph.states import build_states
 from seqopt.plan._answers import walk
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
+from seqopt.scene.scene import with_robots
 from seqopt.sequence.methods import SCHEDULES, modified_sequential, three_robot_loop
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import OpenGrip, thin
-from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
 from seqopt.study import CRITERIA, EQUATIONS

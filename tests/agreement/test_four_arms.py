@@ -13,8 +13,8 @@ from PIL import Image
 from experiments.exchange.four_arms import EXAMPLES, SCENES
 from experiments.harness.scenes import read_folder
 from seqopt.errors import StepError
+from seqopt.exchange.schedules import parse_plan
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence.schedule_file import parse_plan
 from tests.builders import ROOT
 
 

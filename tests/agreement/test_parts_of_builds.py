@@ -17,9 +17,9 @@ from seqopt.plan.plan import Status
 from seqopt.plan.solve import graph_of
 from seqopt.problem.problem import Aim, Orders
 from seqopt.scene.parts import Robot
-from seqopt.scene.scene import in_order
+from seqopt.scene.scene import in_order, with_robots
 from seqopt.sequence.part import Part
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import Site, StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch

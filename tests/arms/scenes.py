@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import seqopt
-from seqopt.scene.arm import Arm, HeldPostures
+from seqopt.arms._arm import Arm, HeldPostures
 from seqopt.scene.parts import Robot
 from tests.builders import small_arch
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt.arms import Arm
 from seqopt.engines.registry import make_engine
 from seqopt.responses.table import force_column
-from seqopt.scene.arm import Arm
 from tests.arms.scenes import NORTH, SOUTH, TOOL
 
 for extra in ("pinocchio", "coal", "compas_fab", "mujoco"):

@@ -6,10 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from seqopt.arms import find_postures
+from seqopt.arms import Arm, find_postures
 from seqopt.arms._model import ArmModel
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.arm import Arm
 from tests.arms.scenes import beside_a_wall, boxes
 
 pytest.importorskip("pinocchio")

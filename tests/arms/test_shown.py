@@ -9,9 +9,9 @@ import pytest
 import seqopt
 from experiments.harness.scenes import read_folder
 from seqopt._cli.main import main
-from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, SceneError
+from seqopt.exchange._files import csv_text
 from seqopt.exchange._tasks import Action, plan_tasks, tasks_json
 from seqopt.exchange.exports import export
 from seqopt.report._folders import task_files

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms import _model, find_postures
+from seqopt.arms import Arm, _model, find_postures
 from seqopt.arms._judge import check_postures
 from seqopt.arms._model import ArmModel, model_path
 from seqopt.arms._permits import permits
@@ -19,7 +19,6 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, GripError, SceneError, StepError
 from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
-from seqopt.scene.arm import Arm
 from seqopt.scene.scene import in_order
 from seqopt.sequence.methods import three_robot_loop
 from tests.arms.scenes import TOOL, beside, two_arms

@@ -13,9 +13,9 @@ import seqopt
 from seqopt._cli.arguments import request
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
+from seqopt.exchange.schedules import read_plan
 from seqopt.plan import _answers
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.work import INTERRUPT, TIME, Clock
 from tests.builders import with_part
 

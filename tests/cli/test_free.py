@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from seqopt._cli.main import main
+from seqopt.exchange.schedules import read_plan
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.sequence.schedule_file import read_plan
 from tests.builders import small_arch
 from tests.commands import beside_models
 from tests.commands import command as run

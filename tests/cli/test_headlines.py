@@ -52,6 +52,21 @@ def test_two_robots_build_by_themselves(capsys, words, says):
         assert (status, FEW in err.splitlines()) == (0, says), err
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["dry"], True),
+        (["dry", "--engine", "compliance"], True),
+        (["dry", "--engine", "auto"], False),  # whose joints are dry
+        (["epoxy", "--engine", "compliance"], False),
+    ],
+)
+def test_dry_joints_that_an_engine_does_not_have_are_said(capsys, words, says):
+    _, _, err = run(capsys, "optimize", "chain:bricks=7", "--mortar", *words)
+    said = "joints: bonded with epoxy in this engine; of steps dry verdicts alone speak"
+    assert (said in err.splitlines()) == says, err
+
+
 def test_a_limit_that_helps_has_three_digits_and_does_help():
     engine = seqopt.make_engine("auto", seqopt.load_scene(WALL))
 

@@ -17,8 +17,7 @@ from seqopt.exchange._building import _touching_order
 from seqopt.exchange._compas_models import read_model
 from seqopt.exchange._content import Given
 from seqopt.exchange._formats import read_file
-from seqopt.exchange._mesh_files import read_obj
-from seqopt.exchange._meshes import repair_shape
+from seqopt.exchange._meshes import read_obj, repair_shape
 from seqopt.exchange.contacts import face_ground, face_joint, flat_face, touching_faces
 from seqopt.exchange.imports import import_scene
 from seqopt.scene._checks import as_vectors

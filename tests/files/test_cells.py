@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt._files import _FORMULA, csv_text, harmless, plain
+from seqopt.exchange._files import _FORMULA, csv_text, harmless, plain
+from seqopt.exchange.schedules import parse_plan, parse_schedule, schedule_text
 from seqopt.sequence.methods import METHODS, three_robot_loop
-from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from tests.builders import small_arch
 
 NAMES = ("=cmd|'/c calc'!A1", "+1", "'@sum", "-x", "rob")

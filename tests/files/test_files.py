@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from seqopt import _files as files
-from seqopt._files import read_text, require_apart, require_folder, write_file, write_folder
+from seqopt._files import read_text, write_file
 from seqopt.errors import FileError
+from seqopt.exchange._files import require_apart, require_folder, write_folder
 from seqopt.work import _answered, _ending
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")

@@ -19,7 +19,8 @@ from seqopt.graph.space import Explorer, Moves, Space
 from seqopt.graph.states import build_states
 from seqopt.instances.model import Instance, _Cap
 from seqopt.problem.problem import Aim
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.scene.scene import with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.stability.assessment import Verdict
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch

@@ -15,11 +15,11 @@ from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SolverError, StepError, TimeUpError
+from seqopt.exchange.schedules import parse_schedule
 from seqopt.graph.states import build_states, within
 from seqopt.judge._schedules import judge_schedule
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.rules import with_robots
-from seqopt.sequence.schedule_file import parse_schedule
+from seqopt.scene.scene import with_robots
 from seqopt.stability.assessment import Verdict, verdict
 from tests.brute_force import ONES, distance
 from tests.builders import small_arch

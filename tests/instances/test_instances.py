@@ -13,7 +13,7 @@ from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
 from seqopt.instances._files import TEXT
-from seqopt.sequence.rules import with_robots
+from seqopt.scene.scene import with_robots
 from tests.builders import small_arch
 
 TIMES = "fetch=30,place=10,approach=10,grip=5,release=5"

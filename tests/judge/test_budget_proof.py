@@ -35,7 +35,8 @@ from seqopt.plan.solve import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.rules import Ending, FreeRules, with_robots
+from seqopt.scene.scene import with_robots
+from seqopt.sequence.rules import Ending, FreeRules
 from tests.builders import small_arch
 from tests.layered import Budget, Costs, answer
 from tests.plain_rules import PlainBook

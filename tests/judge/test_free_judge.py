@@ -16,7 +16,8 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import FrontProblem, find_front
 from seqopt.problem import Amount
 from seqopt.problem.criteria import WorstRatio
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.scene.scene import with_robots
+from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.builders import small_arch
 

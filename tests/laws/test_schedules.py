@@ -20,11 +20,11 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, StepError
+from seqopt.exchange.schedules import parse_schedule, schedule_text
 from seqopt.network.network import GROUND, build_network
 from seqopt.responses.quantities import CHOSEN_BY, lengths, responses_of
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.schedule import islands
-from seqopt.sequence.schedule_file import parse_schedule, schedule_text
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from seqopt.stability.assessment import Verdict, assess, bonded

@@ -28,8 +28,8 @@ from seqopt.exchange._formats import read_file
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene, read_measured
 from seqopt.plan.replan import asked_before
+from seqopt.scene.scene import with_robots
 from seqopt.scene.scene_file import dump_scene
-from seqopt.sequence.rules import with_robots
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
 from tests.documents import BOXES, DOCUMENTS
@@ -91,7 +91,7 @@ def _of_scenes() -> Iterator[tuple[str, File]]:
     scene = seqopt.load_scene(RIGHT)
     network = seqopt.build_network(scene)
     steps = seqopt.sequential(network)
-    loop = seqopt.sequence.schedule_file.schedule_text(seqopt.three_robot_loop(network))
+    loop = seqopt.exchange.schedules.schedule_text(seqopt.three_robot_loop(network))
     yield "scene", ("s.json", dump_scene(scene).encode(), seqopt.load_scene)
     plan = plan_text(scene, steps).encode()
     yield "plan", ("plan.csv", plan, lambda path: seqopt.read_plan(scene, path))

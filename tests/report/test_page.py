@@ -16,10 +16,11 @@ from hypothesis import given, settings
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt._files import Page, csv_text
+from seqopt._files import Page
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ExtraError, ProblemError
+from seqopt.exchange._files import csv_text
 from seqopt.network.network import build_network
 from seqopt.report import _robots, page
 from seqopt.report._notebook import _viewer_class

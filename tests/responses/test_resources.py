@@ -16,13 +16,13 @@ from scipy.stats import rankdata
 
 import seqopt
 from seqopt._cli.main import main
-from seqopt._files import csv_text
 from seqopt.engines.discrete import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import FLAGS, Engine, Want
 from seqopt.engines.registry import ENGINES, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, SceneError, SeqoptError, SolverError
+from seqopt.exchange._files import csv_text
 from seqopt.network.network import build_network
 from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum, equal

@@ -10,8 +10,9 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
+from seqopt.exchange._doubts import find_overlaps
 from seqopt.scene._checks import as_vectors
-from seqopt.scene.boxes import _find_overlaps, _separations, block_brick, overlapping, require_apart
+from seqopt.scene.boxes import _separations, block_brick, overlapping, require_apart
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
@@ -22,7 +23,7 @@ TOLERATED = 0.003
 
 def found(*solids, tolerated=TOLERATED):
     """Depths in mm and overlaps of bounds in mm, by pair."""
-    out = _find_overlaps(solids, [tolerated] * len(solids))
+    out = find_overlaps(solids, [tolerated] * len(solids))
     return {e.pair: (1e3 * e.depth, tuple(1e3 * np.array(e.bounds))) for e in out}
 
 

@@ -13,11 +13,11 @@ import seqopt
 from seqopt import Prop
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning, StepError
-from seqopt.exchange.imports import read_measured
+from seqopt.exchange.imports import as_built, read_measured
 from seqopt.report.page import Build, report_page
 from seqopt.scene import Load, load_scene
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.scenarios import as_built, scenarios
+from seqopt.scene.scenarios import scenarios
 from seqopt.scene.scene import _from_all_ends, _parse_order, in_order
 from seqopt.scene.scene_file import save_scene, scene_to_dict
 from seqopt.sequence.schedule import islands

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 import seqopt
+from seqopt.arms import Arm
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.formulation import formulations
 from seqopt.judge._proof import Proof
@@ -13,9 +14,8 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import find_front
 from seqopt.plan.solve import graph_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
-from seqopt.scene.arm import Arm
-from seqopt.sequence.rules import FreeRules, _check_carried, _too_heavy
-from seqopt.sequence.schedule import can_carry, loads
+from seqopt.scene.scene import _too_heavy, can_carry, loads
+from seqopt.sequence.rules import FreeRules, _check_carried
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES, best_values
 from tests.builders import turned_round

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import StepError
+from seqopt.exchange._doubts import find_doubts
 from seqopt.judge._rule_moves import check_free
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Prop
+from seqopt.scene.scene import _hang_free, with_robots
 from seqopt.sequence._space import free_space
-from seqopt.sequence.rules import FreeRules, _require_buildable, with_robots
+from seqopt.sequence.rules import FreeRules, _require_buildable
 from seqopt.sequence.steps import Site, Step, StepKind
 from tests.brute_force import ONES
 from tests.builders import small_arch
@@ -67,6 +69,18 @@ def test_what_hangs_free_once_robots_let_go_is_named():
         _require_buildable(part, rules[3])
     node = scene.placed[2].nodes[0]
     _require_buildable(build_network(part.scene.with_props(Prop(node=node))), rules[3])
+
+
+def test_scene_method_and_rules_say_alike_that_a_brick_hangs_free():
+    scene = small_arch(4)
+    loose = replace(scene, joints=scene.joints[:-1], grounds=scene.grounds[:1])
+    said = "brick 4 hangs free: no joint leads to the ground"
+    assert f"{said}; tie it" in [*find_doubts(loose)]
+    with pytest.raises(StepError, match=f"{said}, and no robot is sure to hold on"):
+        seqopt.sequential(loose)
+    with pytest.raises(StepError, match=f"{said}; tie it, or let robots hold on"):
+        _require_buildable(build_network(loose), FreeRules())
+    assert _hang_free(range(9, 0, -1)).startswith("bricks 1, 2, 3, 4, 5, 6 and 3 more hang free")
 
 
 def test_further_robots_are_mobile():

@@ -11,7 +11,8 @@ import seqopt
 from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import EPOXY, _find_curing
 from seqopt.judge._schedules import judge_schedule
-from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.scene.scene import with_robots
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
 from tests.brute_force import ONES, allowed, distance

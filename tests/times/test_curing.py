@@ -12,9 +12,9 @@ import seqopt
 from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.plan.plan import Status
-from seqopt.scene import Durations
 from seqopt.sequence.rules import FreeRules
 from seqopt.stability.standing import Standing
+from seqopt.times import Durations
 from seqopt.times._curing import CuringBuilds, JointsInTime
 from seqopt.times._step_check import check_cured, step_ends
 from seqopt.times._steps import step_times

@@ -13,15 +13,15 @@ from seqopt._cli.outputs import Output, read_steps
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
-from seqopt._files import csv_text
 from seqopt._registry import Later
-from seqopt.contact.mortar import Mortar, _mortar_name, _with_friction, _with_mortar, find_mortar
+from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
+from seqopt.exchange._files import csv_text
 from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words
-from seqopt.sequence.part import find_scene, plan_folder
+from seqopt.scene.scene_file import find_scene, plan_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import Verdict
@@ -82,7 +82,8 @@ def run(
     own = find_mortar(mortar or "epoxy")
     (given, taken), rows = read_steps(words, progress), list[dict[str, Any]]()
     values = asked.values(scene=given)
-    own = _with_friction(own, values["friction"])
+    rough = values["friction"]
+    own = own if rough is None else replace(own, friction=rough)
     shown = (own,) if mortar else (Mortar(friction=own.friction), own)  # the last one decides
     mortars = {_mortar_name(each): each for each in shown}
     wanted, shared = find_margins(values["margins"] or ()), (None, values["workers"])

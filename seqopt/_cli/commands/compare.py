@@ -69,7 +69,7 @@ def run(asked: Annotated[Call, ("call", compare)], *, out: Folder = None, progre
         written=written,
         scene=built,
         notes=(
-            *(*levels, *result.enough.lines),
+            *(*levels, *result.enough.lines, *remarks.bonded(computed, mortar)),
             *(*prover.notes, *(figure_notes() if written else ())),
         ),
     )

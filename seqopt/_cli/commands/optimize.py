@@ -106,7 +106,7 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
         },
         "\n".join(_lines(plan, verdicts, over, output)),
         written=written,
-        notes=(*_notes(plan, words.get("engine")), *prover.notes, *spent()),
+        notes=(*_notes(plan, words.get("engine"), words.get("mortar")), *prover.notes, *spent()),
         failures=(INTERRUPTED,) if early else (),
         status=Status.INTERRUPTED if early else Status.DONE,
         scene=scene,
@@ -168,7 +168,7 @@ def _lines(
         yield ADVICE.payload_advice(plan.engine.network, loads)
 
 
-def _notes(plan: Plan, engine: str | None) -> Iterator[str]:
+def _notes(plan: Plan, engine: str | None, mortar: str | None) -> Iterator[str]:
     """Yield notes on levels, rules, scales, proof, idle robots and time."""
     problem = _problem(plan)
     scene, criterion = plan.engine.network.scene, problem.criterion.name
@@ -180,6 +180,7 @@ def _notes(plan: Plan, engine: str | None) -> Iterator[str]:
         yield f"arms: {plan.arms}"
     if plan.ended is not End.INTERRUPTED:
         yield from plan.enough.lines
+        yield from remarks.bonded(plan.engine, mortar)
         yield f"proof: {_proof(plan)}"
     yield from _idle_note(scene, "robots", plan.steps)
     if plan.makespan is not None and "makespan" not in plan.goals:

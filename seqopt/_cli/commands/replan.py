@@ -13,12 +13,12 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.engines.registry import engine_mortar
+from seqopt.exchange.imports import SAME
 from seqopt.plan.plan import Plan
 from seqopt.questions import replan
 from seqopt.responses._tolerance import values_text
 from seqopt.responses.quantities import length_text
-from seqopt.scene.scenarios import SAME
-from seqopt.sequence.part import plan_folder
+from seqopt.scene.scene_file import plan_folder
 from seqopt.sequence.rules import FREE
 from seqopt.work import Tell
 from seqopt.workflow import optimize

@@ -10,8 +10,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.network._words import network_facts, scene_lines
 from seqopt.network.network import build_network
-from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
-from seqopt.sequence.part import find_scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, find_scene, load_scene, save_scene
 from seqopt.work import Tell, with_progress
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Want
+from seqopt.engines.rigid._growth import _cores, _in_threads
 from seqopt.engines.rigid._operator import (
     Doubts,
     GripForces,
@@ -35,7 +36,7 @@ from seqopt.engines.rigid._operator import (
     solve_positive,
     well_conditioned,
 )
-from seqopt.work import _cores, _in_threads, _one_thread
+from seqopt.work import _one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave

@@ -14,10 +14,14 @@ motions would lose digits.
 
 from __future__ import annotations
 
+import os
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache
+from multiprocessing import parent_process
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -25,7 +29,6 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.work import _cores, _in_threads
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
@@ -337,3 +340,22 @@ def _add_products(targets: Sequence[Floats], left: Floats, changes: Sequence[Flo
                 part += np.matmul(some, change, out=rooms[: part.size].reshape(part.shape))
 
     _in_threads(add, range(max(threads, 1)))
+
+
+@cache
+def _cores() -> int:
+    """Return on how many cores this process may work: one where it is one of several workers."""
+    if parent_process() is not None:
+        return 1
+    known = getattr(os, "sched_getaffinity", None)  # not everywhere
+    return len(known(0)) if known else os.cpu_count() or 1
+
+
+def _in_threads(function: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
+    """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
+    first, *others = tasks
+    if not others:
+        return [function(first)]
+    with ThreadPoolExecutor(len(others)) as pool:
+        found = pool.map(function, others)  # begun at once
+        return [function(first), *found]

@@ -20,10 +20,9 @@ from seqopt.scene.parts import Brick, Robot
 class JointLaw:
     """The stiffness of a joint per area of the face over which its bricks meet.
 
-    ``translational``: along the joint's normal and across it twice, N/m per m²; ``rotational``:
-    about the same axes, N m/rad per m². By default what a bed of the translational stiffness over
-    the face resists: it grows with the face's second moments of area. Raises `SceneError` if a
-    number is not finite or negative.
+    ``translational``: along the joint's normal and across it twice, N/m per m². Rotations are
+    resisted as by a bed of this stiffness over the face, with its second moments of area. Raises
+    `SceneError` if a number is not finite or negative.
 
     Examples
     --------
@@ -33,10 +32,9 @@ class JointLaw:
     """
 
     translational: Vector
-    rotational: Vector | None = None
 
     def __post_init__(self) -> None:
-        check(self, "joint law", translational=stiffness, rotational=stiffness)
+        check(self, "joint law", translational=stiffness)
 
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face, N/m and N m/rad.
@@ -46,9 +44,6 @@ class JointLaw:
         normal, one, other = self.translational
         first, second = moments
         turning = (one * first + other * second, normal * first, normal * second)
-        if self.rotational is not None:
-            turn, bend, tilt = self.rotational
-            turning = (area * turn, area * bend, area * tilt)
         return (area * normal, area * one, area * other), turning
 
     def over_rectangle(self, width: float, depth: float) -> tuple[Vector, Vector]:

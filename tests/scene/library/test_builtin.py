@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.assembly import bare_assembly
 from seqopt.errors import SceneError
+from seqopt.exchange._doubts import find_doubts
 from seqopt.network.network import build_network
 from seqopt.scene.boxes import _boxes, _separations, box_corners
 from seqopt.scene.library import ArchForm, WallShape, arch, chain, wall
 from seqopt.scene.scene_file import (
     ABOUT,
-    _find_warnings,
     _parse_scene,
     _scene_by_words,
     builtin_scenes,
@@ -49,7 +49,7 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     scene = load_scene(name)
     assert scene.name == name
     assert scene.provenance
-    assert not [*_find_warnings(scene)]
+    assert not [*find_doubts(scene)]
     assert ABOUT[name]
     assert "\n" not in ABOUT[name]
     assert _parse_scene(dump_scene(scene)) == scene
@@ -181,7 +181,7 @@ def test_no_two_bricks_are_in_one_place(scene):
     _, distance = _separations(scene.bricks)
     thin = min(min(brick.dimensions) for brick in scene.bricks)
     assert distance.min(initial=0.0) >= -1e-6 * thin
-    assert not [*_find_warnings(scene)]
+    assert not [*find_doubts(scene)]
     joined = {frozenset(joint.bricks) for joint in scene.joints}
     assert len(joined) == len(scene.joints)
     place = {brick.name: brick.position for brick in scene.bricks}

@@ -10,21 +10,21 @@ import pytest
 import seqopt
 from experiments.placement.parts.staged import analyze_staged
 from seqopt.errors import FileError, ProblemError, SolverError, StepError
-from seqopt.graph._spaces import among_orders
-from seqopt.graph.states import build_states
-from seqopt.judge._rule_moves import check_free
-from seqopt.judge._schedules import judge_schedule
-from seqopt.network.network import build_network
-from seqopt.sequence.methods import SCHEDULES, sequential
-from seqopt.sequence.part import find_schedule
-from seqopt.sequence.rules import with_robots
-from seqopt.sequence.schedule_file import (
+from seqopt.exchange.schedules import (
     parse_plan,
     parse_schedule,
     read_plan,
     read_schedule,
     schedule_text,
 )
+from seqopt.graph._spaces import among_orders
+from seqopt.graph.states import build_states
+from seqopt.judge._rule_moves import check_free
+from seqopt.judge._schedules import judge_schedule
+from seqopt.network.network import build_network
+from seqopt.scene.scene import with_robots
+from seqopt.sequence.methods import SCHEDULES, sequential
+from seqopt.sequence.part import find_schedule
 from seqopt.sequence.steps import Site, Step, StepKind, check_sequence
 from tests.brute_force import ONES, allowed, best_values
 from tests.builders import small_arch, turned_round

@@ -1,25 +1,22 @@
 """The arm of a robot: which model it is, where its base stands, and how its tool grips a brick.
 
-Lengths are in m, joint stiffnesses in N m/rad. What an arm reaches is worked out in `seqopt.arms`.
+Lengths are in m, joint stiffnesses in N m/rad.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from seqopt._registry import offered
 from seqopt.arrays import Floats, FrozenValue, Ints, Terse, Vector
-from seqopt.errors import ExtraError, SceneError
+from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     check,
-    finite,
     kind_of,
     length,
     not_negative,
@@ -163,66 +160,3 @@ class HeldPostures(FrozenValue):
             stiffness = np.array(arm.joint_stiffness)
             out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
         return np.array(out)
-
-
-def from_arms(name: str) -> Any:
-    """Return a function of the room of arms by name. Raises `ExtraError` without the extra."""
-    found = offered(name)
-    if found is None:
-        raise ExtraError(
-            "robots have arms, and the room seqopt.arms, which knows their reach, is not there: "
-            "install seqopt anew, or leave out the arms"
-        )
-    return found
-
-
-_seconds = partial(finite, least=0.0, wanted="seconds, zero or more")
-_METERS = "a positive number of m/s, or none if ways take no time"
-_speed = partial(finite, least=1e-12, wanted=_METERS)
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Durations(Terse):
-    """How long a robot takes; none of these is assumed where it is not given.
-
-    Parameters
-    ----------
-    fetch : float
-        To take the next brick and bring it: a robot that is free does it before it places, while
-        others hold and act, s.
-    place : float
-        To put the brick in its place; it then holds it, s.
-    approach : float
-        To come to a brick that stands: a robot that is free does it before it grips, s.
-    grip : float
-        To take hold of it, s.
-    release : float
-        To let go, s.
-    speed : float, optional
-        At which it goes from the node that it held last to the next one, in a straight line, before
-        it places or grips, m/s; by default such ways take no time of their own.
-
-    Examples
-    --------
-    >>> print(Durations(fetch=30.0, place=10.0, approach=10.0, grip=5.0, release=5.0))
-    fetch=30,place=10,approach=10,grip=5,release=5
-    """
-
-    fetch: float
-    place: float
-    approach: float
-    grip: float
-    release: float
-    speed: float | None = None
-
-    def __post_init__(self) -> None:
-        names = [name for name in NAMES if name != "speed"]
-        check(self, "durations", **dict.fromkeys(names, _seconds), speed=_speed)
-
-    def __str__(self) -> str:
-        said = [(name, getattr(self, name)) for name in NAMES]
-        return ",".join(f"{name}={value:g}" for name, value in said if value is not None)
-
-
-NAMES = tuple(field.name for field in fields(Durations))
-EXAMPLE = "fetch=30,place=10,approach=10,grip=5,release=5"

@@ -6,10 +6,12 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from seqopt._files import Row, harmless, read_table, read_text
+from seqopt._files import read_text
 from seqopt.errors import StepError
+from seqopt.exchange._files import Row, harmless, read_table
 from seqopt.network.network import Network, network_of
 from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
@@ -27,7 +29,7 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
     scene : Scene
         The scene in which every step must be possible.
     path : pathlib.Path
-        The CSV file; see `parse_plan` for its columns.
+        The CSV file, or the folder of a plan; see `parse_plan` for the columns.
 
     Returns
     -------
@@ -54,7 +56,21 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
     >>> steps[0].bricks, steps[0].held
     (1, (1,))
     """
-    return parse_plan(scene, read_text(path), str(path))
+    file = Path(path) / "plan.csv" if Path(path).is_dir() else Path(path)
+    return parse_plan(scene, read_text(file), str(file))
+
+
+def _read_listed(scene: Scene, path: Path) -> tuple[Step, ...]:
+    """Return the steps of a plan; robots of the scene that it does not list hold nothing."""
+    file = Path(path) / "plan.csv" if Path(path).is_dir() else Path(path)
+    columns = read_text(file).partition("\n")[0].split(",")
+    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
+    steps = read_plan(scene.with_robots(*known) if known else scene, file)
+    if not known:
+        return steps
+    where = [known.index(robot) if robot in known else None for robot in scene.robots]
+    listed = (tuple(None if k is None else s.grips[k] for k in where) for s in steps)
+    return tuple(replace(s, grips=grips) for s, grips in zip(steps, listed, strict=True))
 
 
 def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:

@@ -1,0 +1,123 @@
+"""Tables as CSV, whose cells no spreadsheet takes for formulas, and folders that are complete."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt._files import HIDDEN, _put_all, _told, make_folder
+from seqopt.errors import FileError, SeqoptError
+
+_FORMULA = ("=", "+", "-", "@")
+_MARK = "'"
+
+
+def harmless(text: str) -> str:
+    """Return a cell that spreadsheets take for no formula, with an apostrophe if needed.
+
+    >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
+    ("'=cmd_node", 'rob1_node', "'=x")
+    """
+    return _MARK + text if text.lstrip(_MARK).startswith(_FORMULA) else text
+
+
+def plain(text: str) -> str:
+    """Invert `harmless`."""
+    return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
+
+
+_MOST_CELLS = 10_000_000
+Row = dict[str, str]
+
+
+def read_table(
+    text: str, where: str, error: type[SeqoptError] = FileError
+) -> tuple[list[str], list[tuple[int, Row]]]:
+    """Return the columns of a CSV table, and its rows: the number of the line, cells by column.
+
+    A missing cell is empty; cells beyond the columns are under None. ``error``: raised for other
+    content.
+    """
+    reader = csv.DictReader(io.StringIO(text), restval="")
+    try:
+        columns = [plain(name or "") for name in reader.fieldnames or ()]
+        if len(columns) * text.count("\n") > _MOST_CELLS:
+            raise error(f"{where}: it has more than {_MOST_CELLS:,} cells; give fewer")
+        reader.fieldnames = columns
+        return columns, [(reader.line_num, row) for row in reader]
+    except csv.Error as wrong:
+        raise error(f"{where}: not a readable CSV file: {wrong}") from wrong
+
+
+def csv_text(table: pd.DataFrame | Sequence[Mapping[str, object]], digits: int = 6) -> str:
+    """Return a table as CSV, without its index, rounded to ``digits``; no cell begins a formula.
+
+    Rows of equal columns are written without loading pandas.
+
+    >>> csv_text([{"step": 1, "brick": "=a", "tilt": 2 / 3}]).splitlines()
+    ['step,brick,tilt', "1,'=a,0.666667"]
+    """
+    if isinstance(table, Sequence):
+        names, rows = [*table[0]] if table else [], [tuple(row.values()) for row in table]
+    else:
+        found = table.astype(object).where(table.notna(), None)
+        names, rows = [*table], [*found.itertuples(index=False, name=None)]
+
+    def cell(value: object) -> object:
+        if isinstance(value, float):
+            return "" if math.isnan(value) else f"{value:.{digits}g}"
+        return "" if value is None else harmless(value) if isinstance(value, str) else value
+
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(map(cell, row) for row in [names, *rows])
+    return text.getvalue()
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
+    """Write files by name into a folder, created if missing, all of them or none.
+
+    A new folder appears under its name with all of its files at once. In an existing one all files
+    are written under temporary names before the first is renamed. Raises `FileError`.
+    """
+    target = Path(os.path.realpath(folder))
+    with _told("write", folder):
+        if target.exists():
+            _put_all([(target / name, content) for name, content in files.items()])
+            return
+        make_folder(target.parent)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
+            whole = Path(hidden) / "whole"
+            whole.mkdir()  # as open as any new folder; the one around it is private
+            _put_all([(whole / name, content) for name, content in files.items()])
+            whole.rename(target)
+
+
+def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
+    """Raise a `FileError` if two outputs are the same file, or one is an input."""
+    for i, path in enumerate(outputs):
+        others = [(each, "it is the input") for each in inputs]
+        others += [(each, "two outputs go there") for each in outputs[:i]]
+        for other, why in others:
+            try:
+                same = path.samefile(other)
+            except OSError:  # one of them is not there
+                same = os.path.realpath(path) == os.path.realpath(other)
+            if same:
+                raise FileError(f"cannot write {path}: {why}; name another file")
+
+
+def require_folder(path: Path) -> None:
+    """Raise `FileError`, before anything is computed, if a folder cannot be created or written."""
+    there = Path(os.path.realpath(path))
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        what = "cannot be written" if there.is_dir() else "is not a folder"
+        raise FileError(f"cannot make folder {path}: {there} {what}; name another")
