@@ -50,8 +50,9 @@ from seqopt.exchange._formats import sniffed, writable
 from seqopt.exchange.imports import import_scene
 from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import Prover
+from seqopt.stability.standing import Verdict
 
 Read = TypeVar("Read")
 WHEEL = "compas_cra 0.8.0"

@@ -40,8 +40,9 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.network.network import GROUND
 from seqopt.report._style import styled
-from seqopt.stability.assessment import Verdict, bonded, verdict
+from seqopt.stability.assessment import bonded, verdict
 from seqopt.stability.limit_analysis import Case, Proven, Prover, Sense, compile_equilibrium
+from seqopt.stability.standing import Verdict
 
 NARROW = 1e-5  # between what is proven to fall and to stand
 ROUGH = 5.0  # friction with which no arch slides

@@ -32,8 +32,9 @@ from seqopt.report._style import GRAY, dress, looks, name_panels, plain, styled
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.stability._steps import assess_steps, stability_table
-from seqopt.stability.assessment import MARGINS, bonded
+from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import Prover
+from seqopt.stability.standing import ASSESSED
 from seqopt.study import EQUATIONS
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4
@@ -79,7 +80,7 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     table = analyze(engine, steps)
     robots = [force_column(robot) for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
-    found = (assess_steps(net, steps, mortar, MARGINS) for mortar in (DRY, EPOXY))
+    found = (assess_steps(net, steps, mortar, ASSESSED) for mortar in (DRY, EPOXY))
     dry, bound = (stability_table(steps, each) for each in found)
     own = {name: f"dry{end}" for name, end in ENDS.items()}
     other = {name: f"epoxy{end}" for name, end in ENDS.items()}

@@ -54,8 +54,9 @@ from experiments.stability.parts.witness_cra import (
 )
 from experiments.stability.parts.witness_lmgc90 import moved_by, python_with_lmgc90
 from seqopt.contact.mortar import Mortar
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import Prover, compile_equilibrium
+from seqopt.stability.standing import Verdict
 
 SOONER = 5.0
 LARGEST = "armadillo_cra"

@@ -18,8 +18,7 @@ from seqopt.scene.scenarios import MOST
 from seqopt.scene.scene_file import builtin_scenes, find_scene
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.part import Part
-from seqopt.stability.assessment import MARGINS
-from seqopt.stability.standing import find_standing
+from seqopt.stability.standing import ASSESSED, find_standing
 from seqopt.study import CRITERIA, PUBLISHED
 from seqopt.workflow import Robust, Search
 
@@ -89,7 +88,7 @@ HOW: dict[str, dict[str, Any]] = {
     "schedule": {"names": lambda: SCHEDULES},
     "criterion": {"names": lambda: CRITERIA},
     "formulation": {"names": formulation_names},
-    "margins": {"names": lambda: MARGINS},
+    "margins": {"names": lambda: ASSESSED},
 }  # what a parser knows of options beside their types; names are what help lists
 HIDDEN = ("executor", "made_by", "prover", "scenes")  # that Python alone says
 

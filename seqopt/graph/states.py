@@ -52,12 +52,12 @@ from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips, Site, Step
-from seqopt.stability.assessment import Stability
 from seqopt.stability.standing import Standing, StandingSets, counted
 
 if TYPE_CHECKING:
     from seqopt.graph.formulation import Solution
     from seqopt.sequence._space import FreeSpace, ScheduleSpace
+    from seqopt.stability.assessment import Stability
 
 _Valued = Callable[[Ints], tuple[Floats, Bools]]
 

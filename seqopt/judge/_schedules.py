@@ -16,6 +16,7 @@ from functools import reduce
 from itertools import pairwise
 from math import pi
 from operator import or_
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,8 +49,10 @@ from seqopt.scene.scene import Order, _check_postures
 from seqopt.sequence.rules import _check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability.assessment import MARGINS, Stability, Verdict
-from seqopt.stability.standing import Standing, _size, slack
+from seqopt.stability.standing import ASSESSED, Standing, Verdict, _size, slack
+
+if TYPE_CHECKING:
+    from seqopt.stability.assessment import Stability
 
 STEPS = Later("seqopt.stability._steps")  # where states must stand
 ENDED = ("time", "memory", "interrupt")  # searches that were stopped: no bound is proven
@@ -462,6 +465,6 @@ def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
     mortar = (problem.standing or Standing()).mortar
     for step in steps:
         if (step.bricks, step.grips) not in problem.certified:
-            (result,) = STEPS.each_stability(problem.network, [step], mortar, MARGINS)
+            (result,) = STEPS.each_stability(problem.network, [step], mortar, ASSESSED)
             problem.certified[step.bricks, step.grips] = result
     return tuple(problem.certified[step.bricks, step.grips] for step in steps)

@@ -28,8 +28,7 @@ from seqopt.responses.table import (
     what_was_enough,
 )
 from seqopt.sequence.steps import Site, Step, _check_part
-from seqopt.stability.assessment import MARGINS, Verdict
-from seqopt.stability.standing import Standing
+from seqopt.stability.standing import ASSESSED, Standing, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,7 +95,7 @@ class ShownBuild(Shown):
         Margins take ten times as long as `verdicts` alone. Movements of the ground enter neither.
         Result: as of `seqopt.stability._steps.stability_table`.
         """
-        results = STEPS.assess_steps(self.engine.network, self.steps, mortar, MARGINS)
+        results = STEPS.assess_steps(self.engine.network, self.steps, mortar, ASSESSED)
         table: pd.DataFrame = STEPS.stability_table(self.steps, results)
         return table
 

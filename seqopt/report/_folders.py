@@ -26,8 +26,8 @@ from seqopt.report._pages import comparison_page, front_page, plan_page
 from seqopt.report.comparison import Comparison, method_tables, shown_table
 from seqopt.responses.table import Departure, builds_in_words
 from seqopt.scene.scene_file import dump_scene
-from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
+from seqopt.stability.standing import Verdict
 
 CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
 STYLE = Later("seqopt.report._style")  # likewise

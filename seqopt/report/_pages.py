@@ -35,8 +35,8 @@ from seqopt.responses.table import (
 )
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
-from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
+from seqopt.stability.standing import Verdict
 
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}

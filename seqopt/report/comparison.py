@@ -41,8 +41,8 @@ from seqopt.sequence.part import MOST, find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, _idle_note
-from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
+from seqopt.stability.standing import Verdict
 from seqopt.study import (
     IRREGULARITIES,
     PUBLISHED,

@@ -23,7 +23,8 @@ from seqopt._registry import later
 if TYPE_CHECKING:
     from seqopt.stability._screens import Margins, Screen
     from seqopt.stability._steps import assess_steps, stability_table
-    from seqopt.stability.assessment import LoadFactor, Stability, Verdict, assess, load_factors
+    from seqopt.stability.assessment import LoadFactor, Stability, assess, load_factors
+    from seqopt.stability.standing import Verdict
 
 __all__ = [
     "LoadFactor",
@@ -38,5 +39,6 @@ __all__ = [
 ]
 HOMES = dict.fromkeys(__all__, "assessment")
 HOMES |= dict.fromkeys(["Margins", "Screen"], "_screens")
+HOMES["Verdict"] = "standing"
 HOMES |= dict.fromkeys(["assess_steps", "stability_table"], "_steps")
 __getattr__, __dir__ = later(__name__, HOMES)

@@ -31,7 +31,7 @@ from seqopt.contact.mortar import ROUGHEST, Mortar, find_mortar
 from seqopt.errors import GripError, SceneError, plugins
 from seqopt.network.network import Network, network_of
 from seqopt.scene.scene import Scene
-from seqopt.stability.assessment import FALLS, OPEN, STANDS, bonded
+from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import (
     CAP,
     DIRECTIONS,
@@ -50,6 +50,7 @@ from seqopt.stability.limit_analysis import (
     sideways,
     violation,
 )
+from seqopt.stability.standing import FALLS, OPEN, STANDS
 
 Enough = Callable[[Answer], bool]
 """Says whether an answer proves what is asked, or the program must be refined."""

@@ -31,15 +31,7 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import _find_overlapping
 from seqopt.sequence.steps import Grips, Step, require_steps
 from seqopt.stability._interior_point import approach
-from seqopt.stability.assessment import (
-    MARGINS,
-    Stability,
-    Verdict,
-    _failure,
-    _verdict_of,
-    assess,
-    bonded,
-)
+from seqopt.stability.assessment import Stability, _failure, _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import (
     DIRECTIONS,
     EXACT,
@@ -53,6 +45,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
+from seqopt.stability.standing import ASSESSED, Verdict
 from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
@@ -286,10 +279,10 @@ def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
     """Return margins by their names, as of `assess_steps`; text has commas between them."""
     names = tuple(asked.split(",")) if isinstance(asked, str) else tuple(asked)
     for name in names:
-        if name not in (*MARGINS, "all"):
-            hint = did_you_mean(str(name), MARGINS)
-            raise SceneError(f"margin {name!r}{hint}: give all, or some of {', '.join(MARGINS)}")
-    return MARGINS if "all" in names else names
+        if name not in (*ASSESSED, "all"):
+            hint = did_you_mean(str(name), ASSESSED)
+            raise SceneError(f"margin {name!r}{hint}: give all, or some of {', '.join(ASSESSED)}")
+    return ASSESSED if "all" in names else names
 
 
 def each_stability(

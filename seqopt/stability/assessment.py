@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -37,23 +36,14 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     safe_pull,
 )
+from seqopt.stability.standing import ASSESSED, Verdict
 from seqopt.work import Tell, with_progress
 
-STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
 CONES = "cone program"  # what proves a verdict where nothing simpler does
-MARGINS = ("bond", "friction", "tilt", "payload")
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
 _LITTLE = 1e-3  # friction that holds nothing but what is jammed
 _FRICTION_STEP = 1e-4  # to which the least one is found
 _ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
-
-
-class Verdict(Enum):
-    """What is proven about an assembly: it stands, it does not, or neither is proven."""
-
-    STANDS = "stands"
-    FALLS = "does not stand"
-    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,7 +127,7 @@ def assess(
     mortar: Mortar,
     up: Vector = (0.0, 0.0, 1.0),
     compiled: Compile = compile_equilibrium,
-    margins: Collection[str] = MARGINS,
+    margins: Collection[str] = ASSESSED,
 ) -> Stability:
     """Return verdict and margins of an assembly.
 
@@ -150,7 +140,7 @@ def assess(
     compiled : callable, optional
         Makes the program to solve; the registered one by default.
     margins : collection of str, optional
-        Of `MARGINS`; those left out are NaN.
+        Of `ASSESSED`; those left out are NaN.
 
     Returns
     -------

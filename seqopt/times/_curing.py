@@ -19,9 +19,9 @@ from seqopt.network.network import Network
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.stability._screens import node_assembly
 from seqopt.stability._steps import VerdictChain
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import EXACT, LARGEST_FORCE, contact_work, limits
-from seqopt.stability.standing import Standing
+from seqopt.stability.standing import Standing, Verdict
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there
 

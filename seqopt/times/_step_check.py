@@ -13,8 +13,8 @@ from seqopt.judge.certificate import BETTER
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Site, Step, StepKind
-from seqopt.stability.assessment import Verdict, verdict
-from seqopt.stability.standing import Standing
+from seqopt.stability.assessment import verdict
+from seqopt.stability.standing import Standing, Verdict
 
 CLOSE = 1e-9  # of a time: what rounding may take from an age
 

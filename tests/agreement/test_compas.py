@@ -17,7 +17,8 @@ from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene
 from seqopt.network.network import build_network
 from seqopt.sequence.methods import METHODS
-from seqopt.stability.assessment import Verdict, assess
+from seqopt.stability.assessment import assess
+from seqopt.stability.standing import Verdict
 
 pytestmark = [
     pytest.mark.slow,

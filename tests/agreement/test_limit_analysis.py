@@ -16,8 +16,9 @@ from seqopt.errors import SceneError
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._screens import Margins, Screen
-from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
+from seqopt.stability.assessment import _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import Prover
+from seqopt.stability.standing import Verdict
 from tests.strategies import arches
 
 

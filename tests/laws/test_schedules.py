@@ -27,8 +27,9 @@ from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
-from seqopt.stability.assessment import Verdict, assess, bonded
+from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.limit_analysis import Prover
+from seqopt.stability.standing import Verdict
 from tests.builders import (
     HERE,
     about_vertical,

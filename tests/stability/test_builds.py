@@ -11,8 +11,9 @@ from seqopt.contact.assembly import step_assembly
 from seqopt.scene.scene_file import dump_scene
 from seqopt.stability import _steps, failure_map
 from seqopt.stability._steps import VerdictChain, each_verdict
-from seqopt.stability.assessment import Verdict, verdict
+from seqopt.stability.assessment import verdict
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
+from seqopt.stability.standing import Verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 

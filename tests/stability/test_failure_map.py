@@ -15,9 +15,10 @@ from seqopt.report._failures import cure_words, failure_blocks, usual_builds
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._screens import Screen
 from seqopt.stability._steps import step_verdicts
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
 from seqopt.stability.limit_analysis import Prover
+from seqopt.stability.standing import Verdict
 from tests.blocks import box
 from tests.documents import obj
 

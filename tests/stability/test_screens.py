@@ -18,7 +18,7 @@ from seqopt.errors import GripError, SceneError
 from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Margins, Screen, held_places
-from seqopt.stability.assessment import Verdict, assess, bonded, load_factors
+from seqopt.stability.assessment import assess, bonded, load_factors
 from seqopt.stability.limit_analysis import (
     _MORE,
     DIRECTIONS,
@@ -29,6 +29,7 @@ from seqopt.stability.limit_analysis import (
     safe_pull,
     sideways,
 )
+from seqopt.stability.standing import Verdict
 from tests.builders import small_arch
 
 

@@ -28,8 +28,9 @@ from seqopt.stability._steps import (
     stability_row,
     step_verdicts,
 )
-from seqopt.stability.assessment import MARGINS, Verdict, verdict
+from seqopt.stability.assessment import verdict
 from seqopt.stability.limit_analysis import Answer, Claim
+from seqopt.stability.standing import ASSESSED, Verdict
 from tests.blocks import with_shapes
 from tests.builders import branch, from_both_ends, running_bond, six_bricks
 from tests.limit_scenes import chain as leaning_chain
@@ -56,7 +57,7 @@ def wholes(network, steps):
 
 
 @pytest.mark.xdist_group("steps with all margins")  # which are found once
-@pytest.mark.parametrize("margin", MARGINS)
+@pytest.mark.parametrize("margin", ASSESSED)
 def test_a_margin_is_found_alone_as_with_all_others(network, steps, wholes, margin):
     for whole, found in zip(wholes, assess_steps(network, steps, DRY, [margin]), strict=True):
         assert found.verdict is whole.verdict

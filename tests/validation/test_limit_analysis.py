@@ -14,8 +14,9 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.scene.parts import Robot
 from seqopt.stability._screens import STANDS, HeldStates, Margins, Screen, _decided, _narrow
-from seqopt.stability.assessment import Verdict, assess, bonded
+from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.limit_analysis import EXACT, sideways
+from seqopt.stability.standing import Verdict
 from tests.builders import block, held, lacking
 
 ROUGH = Mortar(friction=5.0)

@@ -26,8 +26,8 @@ from seqopt import Scene, Step, build_network
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import failure_map
+from seqopt.stability.standing import Verdict
 
 DIRECTIONS = 16  # in which friction is bounded
 ALL_ROUND = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
