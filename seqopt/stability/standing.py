@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass, field, replace
 from enum import Enum
 from math import degrees, pi, radians
 from operator import le
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from seqopt.contact.mortar import (
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
-
-if TYPE_CHECKING:
-    from seqopt.stability._screens import Screen
 
 SCREENS = Later("seqopt.stability._screens")  # where states must stand
 
@@ -152,12 +149,12 @@ class StandingSets:
         self._proofs, self._others = SCREENS.Proofs(), list[StandingSets]()
         self._screens = self._screened()
         self._margins = SCREENS.Margins(network, standing.mortar)
-        self._tilts_known: dict[int, Screen] = {}
+        self._tilts_known: dict[int, Any] = {}
         self._known: Mapping[str, KnownRows] = {name: KnownRows() for name in ("", *MARGINS)}
         self._most = 1 + 2 * len(network.inner)
         self.undecided = 0
 
-    def _screened(self) -> list[Screen]:
+    def _screened(self) -> list[Any]:
         proofs = self._proofs
         return [
             SCREENS.Screen(self._network, demand.mortar, demand.tilt, proofs=proofs)
