@@ -52,7 +52,7 @@ from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import Prover
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 Read = TypeVar("Read")
 WHEEL = "compas_cra 0.8.0"

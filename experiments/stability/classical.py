@@ -42,7 +42,7 @@ from seqopt.network.network import GROUND
 from seqopt.report._style import styled
 from seqopt.stability.assessment import bonded, verdict
 from seqopt.stability.limit_analysis import Case, Proven, Prover, Sense, compile_equilibrium
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 NARROW = 1e-5  # between what is proven to fall and to stand
 ROUGH = 5.0  # friction with which no arch slides

@@ -31,7 +31,7 @@ from seqopt.errors import MechanismError, SolverError
 from seqopt.report._style import BLUE, GRAY, VERMILION, plain, styled
 from seqopt.sequence.methods import METHODS
 from seqopt.stability._steps import assess_steps
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
 SHOWN: dict[str, dict[str, Any]] = {

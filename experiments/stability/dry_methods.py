@@ -34,7 +34,7 @@ from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.stability._steps import assess_steps, stability_table
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import Prover
-from seqopt.stability.standing import ASSESSED
+from seqopt.stability.verdict import ASSESSED
 from seqopt.study import EQUATIONS
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4

@@ -56,7 +56,7 @@ from experiments.stability.parts.witness_lmgc90 import moved_by, python_with_lmg
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import Prover, compile_equilibrium
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 SOONER = 5.0
 LARGEST = "armadillo_cra"

@@ -18,7 +18,8 @@ from seqopt.scene.scenarios import MOST
 from seqopt.scene.scene_file import builtin_scenes, find_scene
 from seqopt.sequence.methods import METHODS, SCHEDULES
 from seqopt.sequence.part import Part
-from seqopt.stability.standing import ASSESSED, find_standing
+from seqopt.stability.standing import find_standing
+from seqopt.stability.verdict import ASSESSED
 from seqopt.study import CRITERIA, PUBLISHED
 from seqopt.workflow import Robust, Search
 

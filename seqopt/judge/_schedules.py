@@ -49,7 +49,8 @@ from seqopt.scene.scene import Order, _check_postures
 from seqopt.sequence.rules import _check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability.standing import ASSESSED, Standing, Verdict, _size, slack
+from seqopt.stability.standing import Standing, _size, slack
+from seqopt.stability.verdict import ASSESSED, Verdict
 
 if TYPE_CHECKING:
     from seqopt.stability.assessment import Stability

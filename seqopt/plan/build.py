@@ -28,7 +28,8 @@ from seqopt.responses.table import (
     what_was_enough,
 )
 from seqopt.sequence.steps import Site, Step, _check_part
-from seqopt.stability.standing import ASSESSED, Standing, Verdict
+from seqopt.stability.standing import Standing
+from seqopt.stability.verdict import ASSESSED, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -27,7 +27,7 @@ from seqopt.report.comparison import Comparison, method_tables, shown_table
 from seqopt.responses.table import Departure, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 CHARTS = Later("seqopt.report.charts")  # matplotlib is an extra
 STYLE = Later("seqopt.report._style")  # likewise

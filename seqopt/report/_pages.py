@@ -36,7 +36,7 @@ from seqopt.responses.table import (
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}

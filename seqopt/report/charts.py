@@ -18,7 +18,7 @@ from seqopt.report._failures import AXIS_WORDS
 from seqopt.report._style import GRAY, SKY, SMALL, VERMILION, dress, looks, new_figure, styled
 from seqopt.report.comparison import _in_shown_unit, largest
 from seqopt.stability.failure_map import FailureMap
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 CASE = 0.27  # inches: of a row of a map of failure
 MARKS = 12  # along a line, so that lines are told apart without their color

@@ -42,7 +42,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, _idle_note
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.study import (
     IRREGULARITIES,
     PUBLISHED,

@@ -25,7 +25,7 @@ from seqopt.exchange._files import csv_text
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.work import Stage, Tell, hire, map_ordered
 from seqopt.workflow import optimize
 

@@ -15,7 +15,7 @@ from seqopt.responses.scales import _response_along
 from seqopt.responses.table import OUTSIDE, Departure, _Columns
 from seqopt.scene.scene import Scene
 from seqopt.stability.failure_map import BuildVerdicts, _settlement_said
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
 

@@ -19,7 +19,7 @@ from seqopt.responses.table import LinearRange, _held_cells, _table_of, response
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import assess_steps
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 
 def analyze_each(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from seqopt.stability._screens import Margins, Screen
     from seqopt.stability._steps import assess_steps, stability_table
     from seqopt.stability.assessment import LoadFactor, Stability, assess, load_factors
-    from seqopt.stability.standing import Verdict
+    from seqopt.stability.verdict import Verdict
 
 __all__ = [
     "LoadFactor",
@@ -39,6 +39,6 @@ __all__ = [
 ]
 HOMES = dict.fromkeys(__all__, "assessment")
 HOMES |= dict.fromkeys(["Margins", "Screen"], "_screens")
-HOMES["Verdict"] = "standing"
+HOMES["Verdict"] = "verdict"
 HOMES |= dict.fromkeys(["assess_steps", "stability_table"], "_steps")
 __getattr__, __dir__ = later(__name__, HOMES)

@@ -50,7 +50,7 @@ from seqopt.stability.limit_analysis import (
     sideways,
     violation,
 )
-from seqopt.stability.standing import FALLS, OPEN, STANDS
+from seqopt.stability.verdict import FALLS, OPEN, STANDS
 
 Enough = Callable[[Answer], bool]
 """Says whether an answer proves what is asked, or the program must be refined."""

@@ -45,7 +45,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     violation,
 )
-from seqopt.stability.standing import ASSESSED, Verdict
+from seqopt.stability.verdict import ASSESSED, Verdict
 from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program

@@ -36,7 +36,7 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
     safe_pull,
 )
-from seqopt.stability.standing import ASSESSED, Verdict
+from seqopt.stability.verdict import ASSESSED, Verdict
 from seqopt.work import Tell, with_progress
 
 CONES = "cone program"  # what proves a verdict where nothing simpler does

@@ -36,7 +36,7 @@ from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._steps import each_verdict
 from seqopt.stability.assessment import Stability, assess
 from seqopt.stability.limit_analysis import horizontal
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.work import Tell, with_progress
 
 if TYPE_CHECKING:

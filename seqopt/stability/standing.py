@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from enum import Enum
 from math import degrees, pi, radians
 from operator import le
 from typing import Any
@@ -26,28 +25,19 @@ from seqopt.contact.mortar import (
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle, short
+from seqopt.stability.verdict import ASSESSED, FALLS, OPEN, STANDS
 
 SCREENS = Later("seqopt.stability._screens")  # where states must stand
 
-STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
-MARGINS = ("bond", "friction", "tilt")
+MARGINS = ASSESSED[:3]
 """Margins of stability that goals minimize: the least bond (Pa, in tension, with that times
 1 + friction as cohesion), the least coefficient of friction, and the difference of a right angle
 and the critical tilt (rad)."""
-ASSESSED = (*MARGINS, "payload")  # what an assessment finds beside the verdict
 TILTS = 2048  # steps of a right angle, to which the tilt of a state is found
 STEP = pi / 2 / TILTS  # rad
 NARROW = 0.02
 """Relative width within which a margin is proven: of a bond, a friction, the critical tilt."""
 _LEAST = {"bond": 0.0, "friction": 1e-4, "tilt": 1e-4}  # within which one is that is hardly any
-
-
-class Verdict(Enum):
-    """What is proven about an assembly: it stands, it does not, or neither is proven."""
-
-    STANDS = "stands"
-    FALLS = "does not stand"
-    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ from seqopt.stability._screens import node_assembly
 from seqopt.stability._steps import VerdictChain
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import EXACT, LARGEST_FORCE, contact_work, limits
-from seqopt.stability.standing import Standing, Verdict
+from seqopt.stability.standing import Standing
+from seqopt.stability.verdict import Verdict
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there
 

@@ -14,7 +14,8 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Site, Step, StepKind
 from seqopt.stability.assessment import verdict
-from seqopt.stability.standing import Standing, Verdict
+from seqopt.stability.standing import Standing
+from seqopt.stability.verdict import Verdict
 
 CLOSE = 1e-9  # of a time: what rounding may take from an age
 

@@ -18,7 +18,7 @@ from seqopt.exchange.imports import import_scene
 from seqopt.network.network import build_network
 from seqopt.sequence.methods import METHODS
 from seqopt.stability.assessment import assess
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 pytestmark = [
     pytest.mark.slow,

@@ -25,7 +25,7 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import OpenGrip, thin
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import verdict
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.study import CRITERIA, EQUATIONS
 from tests.brute_force import FOUR, ONES, allowed, distance, whole_graph
 from tests.builders import Counting, small_arch

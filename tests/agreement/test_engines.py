@@ -23,7 +23,7 @@ from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import ABOUT, load_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.stability._steps import assess_steps
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.study import published_plan
 from tests.blocks import with_shapes
 from tests.builders import apart, block, hinged, largest_difference, scaled, six_bricks

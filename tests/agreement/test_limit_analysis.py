@@ -18,7 +18,7 @@ from seqopt.scene.parts import Robot
 from seqopt.stability._screens import Margins, Screen
 from seqopt.stability.assessment import _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import Prover
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.strategies import arches
 
 

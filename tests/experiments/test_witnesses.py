@@ -29,7 +29,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.builders import six_bricks
 from tests.commands import command
 from tests.quality.kernels import NAMES, every, other, running

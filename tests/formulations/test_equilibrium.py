@@ -30,7 +30,8 @@ from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case, Claim, Prover, Sense, limits
-from seqopt.stability.standing import NARROW, Standing, Verdict, _without_implied, slack
+from seqopt.stability.standing import NARROW, Standing, _without_implied, slack
+from seqopt.stability.verdict import Verdict
 from tests.brute_force import ONES as FOUR_ONES
 from tests.brute_force import allowed, least_peak, peaks, whole_graph
 from tests.builders import held, small_arch

@@ -21,7 +21,7 @@ from seqopt.instances.model import Instance, _Cap
 from seqopt.problem.problem import Aim
 from seqopt.scene.scene import with_robots
 from seqopt.sequence.rules import FreeRules
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 from tests.random_graphs import graphs, simple_paths, values_of

@@ -21,7 +21,7 @@ from seqopt.judge._schedules import judge_schedule
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.scene.scene import with_robots
 from seqopt.stability.assessment import verdict
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.brute_force import ONES, distance
 from tests.builders import small_arch
 

@@ -29,7 +29,7 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.limit_analysis import Prover
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.builders import (
     HERE,
     about_vertical,

@@ -19,7 +19,7 @@ from seqopt.report.text import _deciding_step, _headline, _in_a_sentence
 from seqopt.responses.table import Departure, analyze, force_column
 from seqopt.sequence.methods import sequential
 from seqopt.stability.failure_map import BuildProver, BuildVerdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.browser import BROWSER, browsed, browses
 from tests.commands import command
 

@@ -13,7 +13,7 @@ from seqopt.stability import _steps, failure_map
 from seqopt.stability._steps import VerdictChain, each_verdict
 from seqopt.stability.assessment import verdict
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 

@@ -18,7 +18,7 @@ from seqopt.stability._steps import step_verdicts
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.failure_map import failure_map
 from seqopt.stability.limit_analysis import Prover
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.blocks import box
 from tests.documents import obj
 

@@ -23,7 +23,7 @@ from seqopt.stability import assessment, limit_analysis
 from seqopt.stability._steps import _MARGINS, format_rows, stability_table
 from seqopt.stability.assessment import _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Claim, Proven, Prover, bound, violation
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 SLIPPERY = Mortar(friction=1e-3)
 

@@ -29,7 +29,7 @@ from seqopt.stability.limit_analysis import (
     safe_pull,
     sideways,
 )
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.builders import small_arch
 
 

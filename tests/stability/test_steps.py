@@ -30,7 +30,7 @@ from seqopt.stability._steps import (
 )
 from seqopt.stability.assessment import verdict
 from seqopt.stability.limit_analysis import Answer, Claim
-from seqopt.stability.standing import ASSESSED, Verdict
+from seqopt.stability.verdict import ASSESSED, Verdict
 from tests.blocks import with_shapes
 from tests.builders import branch, from_both_ends, running_bond, six_bricks
 from tests.limit_scenes import chain as leaning_chain

@@ -15,7 +15,7 @@ from seqopt.scene.scene import with_robots
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import verdict
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.brute_force import ONES, allowed, distance
 from tests.builders import small_arch
 from tests.plain_rules import PlainBook

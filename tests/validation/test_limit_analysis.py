@@ -16,7 +16,7 @@ from seqopt.scene.parts import Robot
 from seqopt.stability._screens import STANDS, HeldStates, Margins, Screen, _decided, _narrow
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.limit_analysis import EXACT, sideways
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from tests.builders import block, held, lacking
 
 ROUGH = Mortar(friction=5.0)

@@ -27,7 +27,7 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.stability.failure_map import failure_map
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 DIRECTIONS = 16  # in which friction is bounded
 ALL_ROUND = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])

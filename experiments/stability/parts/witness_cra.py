@@ -24,7 +24,7 @@ from experiments.stability.parts.blocks import BOX, Blocks, Contact, ring, stack
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 
 SLOPE = np.pi / 6
 VOUSSOIRS = 24

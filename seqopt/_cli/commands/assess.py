@@ -25,7 +25,7 @@ from seqopt.scene.scene_file import find_scene, plan_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability._steps import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.failure_map import AXES, _settlement_said, failure_map
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.work import Tell, with_progress
 
 MAP = Later("seqopt.report._failures")  # 24 ms, of pages

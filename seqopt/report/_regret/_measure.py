@@ -46,7 +46,7 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
-from seqopt.stability.standing import Verdict
+from seqopt.stability.verdict import Verdict
 from seqopt.work import Stage, Tell, _ending
 
 TIMES = 3
