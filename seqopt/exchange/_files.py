@@ -7,13 +7,18 @@ import io
 import math
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from seqopt._files import HIDDEN, _put_all, _told, make_folder
 from seqopt.errors import FileError, SeqoptError
+from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.methods import SCHEDULES
+from seqopt.sequence.rules import FREE
+from seqopt.work import Tell
 
 _FORMULA = ("=", "+", "-", "@")
 _MARK = "'"
@@ -121,3 +126,51 @@ def require_folder(path: Path) -> None:
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
         what = "cannot be written" if there.is_dir() else "is not a folder"
         raise FileError(f"cannot make folder {path}: {there} {what}; name another")
+
+
+def listed(rows: Sequence[Mapping[str, Any]], counts: Container[str] = ()) -> list[str]:
+    """Return the lines of a table to read, without columns that are empty.
+
+    ``counts``: columns in which zeros are left out. Pandas would take 0.2 s to load.
+    """
+
+    def cell(name: str, value: Any) -> str:
+        if value is None or value != value or (name in counts and not value):  # noqa: PLR0124
+            return ""
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+    columns = [[name, *(cell(name, row[name]) for row in rows)] for name in rows[0]]
+    told = [column for column in columns if any(column[1:])]
+    wide = [[text.rjust(max(map(len, column))) for text in column] for column in told]
+    return ["  ".join(line) for line in zip(*wide, strict=True)]
+
+
+class Output:
+    """Where a command writes, if it does, and what it reads, which it never overwrites."""
+
+    def __init__(self, out: Path | None, *given: object) -> None:
+        """Take scene, plan and schedule that are given; those that are words for paths count."""
+        self.path, self._given = out, given
+
+    def keep_apart(self, *outputs: Path | None) -> None:
+        """Raise `FileError` if two outputs are the same file, or one is an input."""
+        names = {*builtin_scenes(), *SCHEDULES, FREE}
+        paths = [Path(e) for e in self._given if isinstance(e, str | Path) and str(e) not in names]
+        inside = [p / name for p in paths if p.is_dir() for name in ("scene.json", "plan.csv")]
+        require_apart([path for path in outputs if path is not None], [*paths, *inside])
+
+    def require(self, *names: str) -> None:
+        """Raise `FileError`, before anything is computed, if the folder cannot be created."""
+        if self.path is not None:
+            require_folder(self.path)
+            self.keep_apart(*(self.path / name for name in names))
+
+    def write(self, tell: Tell, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
+        """Write the files to the folder, all or none, if there is one; return the paths."""
+        if self.path is None:
+            return ()
+        tell("writing the plan")
+        made = files()
+        self.keep_apart(*(self.path / name for name in made))
+        write_folder(self.path, made)
+        return (self.path,)

@@ -8,12 +8,13 @@ from typing import Annotated
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import Output, read_build
+from seqopt._cli.outputs import read_build
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.registry import level_notes, provenance
 from seqopt.errors import MechanismError, SeqoptError, SolverError
+from seqopt.exchange._files import Output
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.questions import analyze
 from seqopt.responses._faults import _with_faults, analyze_each, faults_said

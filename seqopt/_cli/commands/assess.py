@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from seqopt._cli import outputs
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import Output, read_steps
+from seqopt._cli.outputs import read_steps
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
@@ -17,7 +17,7 @@ from seqopt._registry import Later
 from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
-from seqopt.exchange._files import csv_text
+from seqopt.exchange._files import Output, csv_text, listed
 from seqopt.problem.requirements import _carrying_excesses, number_word
 from seqopt.questions import assess
 from seqopt.responses.quantities import _steps_in_words
@@ -118,22 +118,10 @@ def _answer(
         status = Status.FAILED
     said = outputs.put_table(output.path, rows, "\n".join(lines) + ";")
     if output.path is None:
-        said["text"] = "\n".join([*lines, "", *_listed(rows), "", "--out FILE or --quiet: as CSV"])
+        said["text"] = "\n".join(
+            [*lines, "", *listed(rows, COUNTS), "", "--out FILE or --quiet: as CSV"]
+        )
     return Answer(facts, **said, failures=failures, status=status)
-
-
-def _listed(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a table to read, without columns that are empty: pandas would take 0.2 s to load."""
-
-    def cell(name: str, value: Any) -> str:
-        if value is None or value != value or (name in COUNTS and not value):  # noqa: PLR0124
-            return ""
-        return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-    columns = [[name, *(cell(name, row[name]) for row in rows)] for name in rows[0]]
-    told = [column for column in columns if any(column[1:])]
-    wide = [[text.rjust(max(map(len, column))) for text in column] for column in told]
-    return ["  ".join(line) for line in zip(*wide, strict=True)]
 
 
 def _map(

@@ -8,11 +8,11 @@ import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import columns, wrapped
 from seqopt._cli.words import Folder
 from seqopt.engines.registry import level_notes, provenance, simplest
+from seqopt.exchange._files import Output
 from seqopt.report._folders import comparison_files, figure_notes
 from seqopt.report._questions import compare, own_engine
 from seqopt.report.comparison import Comparison, _printed_largest, format_comparison

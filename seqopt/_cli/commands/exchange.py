@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.outputs import Output, read_steps
+from seqopt._cli.outputs import read_steps
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt._files import write_file
 from seqopt.arms._kept import arm_faults, posture_trouble
 from seqopt.exchange._content import Given
-from seqopt.exchange._files import require_apart
+from seqopt.exchange._files import Output, require_apart
 from seqopt.exchange._formats import formats, readable
 from seqopt.exchange.exports import export
 from seqopt.exchange.imports import import_scene

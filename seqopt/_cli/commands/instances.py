@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Annotated
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
 from seqopt.engines.registry import engine_mortar
 from seqopt.errors import ProblemError, SolverError
+from seqopt.exchange._files import Output
 from seqopt.instances._files import WRITTEN, read_instance, save_instance
 from seqopt.instances._judge import judge_instance
 from seqopt.instances.compiled import instance

@@ -10,12 +10,13 @@ from typing import Annotated, Any
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import ALWAYS, Output
+from seqopt._cli.outputs import ALWAYS
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt._registry import Later
 from seqopt.engines.registry import engine_mortar, level_notes
+from seqopt.exchange._files import Output
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan

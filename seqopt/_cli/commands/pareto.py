@@ -12,11 +12,11 @@ import pandas as pd
 
 from seqopt._cli import outputs, remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import Folder
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_mortar, level_notes
+from seqopt.exchange._files import Output
 from seqopt.plan.front import Front
 from seqopt.plan.solve import graph_of
 from seqopt.questions import pareto

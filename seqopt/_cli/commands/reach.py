@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.arms._permits import reach, reach_described, reached_by_region
-from seqopt.exchange._files import csv_text
+from seqopt.exchange._files import Output, csv_text
 from seqopt.work import Tell
 
 

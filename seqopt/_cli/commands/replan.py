@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import answered
-from seqopt._cli.outputs import ALWAYS, Output
+from seqopt._cli.outputs import ALWAYS
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.engines.registry import engine_mortar
+from seqopt.exchange._files import Output
 from seqopt.exchange.imports import SAME
 from seqopt.plan.plan import Plan
 from seqopt.questions import replan

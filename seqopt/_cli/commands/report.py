@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import Annotated
 
-from seqopt._cli import outputs
 from seqopt._cli.answer import Answer
 from seqopt._cli.outputs import read_build
 from seqopt._cli.signatures import Call
@@ -14,6 +13,7 @@ from seqopt._cli.words import File
 from seqopt._files import PAGE
 from seqopt.arms._kept import posture_trouble
 from seqopt.engines.registry import engine_mortar
+from seqopt.exchange._files import Output
 from seqopt.plan.build import ShownBuild
 from seqopt.report._questions import own_engine, report
 from seqopt.work import Tell
@@ -47,7 +47,7 @@ def run(
         words["scene"] = str(place / "scene.json")
     name = re.sub(r"\W+", "-", place.name.removesuffix(".json")).strip("-")
     path = out or (place / PAGE if place.is_dir() else Path(f"{name}.html"))
-    outputs.Output(out, words.get("scene")).keep_apart(path)
+    Output(out, words.get("scene")).keep_apart(path)
     engine, cache = Call(own_engine, words)(), words.get("cache")
     trouble = posture_trouble(engine.network.scene, cache, progress)
     notes = (f"arms: drawn without postures; {trouble}",) if trouble else ()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 from seqopt._cli.answer import Answer, scene_facts
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
+from seqopt.exchange._files import Output
 from seqopt.network._words import network_facts, scene_lines
 from seqopt.network.network import build_network
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, find_scene, load_scene, save_scene

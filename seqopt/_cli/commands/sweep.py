@@ -8,12 +8,11 @@ from itertools import product
 from typing import Annotated
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import Output
 from seqopt._cli.signatures import Call, Option, signature_of
 from seqopt._cli.words import Folder
 from seqopt._files import make_folder
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.exchange._files import csv_text, write_folder
+from seqopt.exchange._files import Output, csv_text, write_folder
 from seqopt.plan.plan import Plan
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.report.sweep import MOST, spread, sweep

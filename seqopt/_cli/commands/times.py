@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.outputs import Output, read_build
+from seqopt._cli.outputs import read_build
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.arms._kept import arm_faults, posture_trouble
-from seqopt.exchange._files import csv_text
+from seqopt.exchange._files import Output, csv_text
 from seqopt.problem.requirements import _carrying_excesses
 from seqopt.report._folders import figure_notes, picture_files
 from seqopt.sequence.steps import _idle_note
