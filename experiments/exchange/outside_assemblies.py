@@ -6,8 +6,8 @@ and supports where the file has none; ``seqopt optimize``, the loop of three rob
 `overlap_dp`, or the free schedule where there are fewer than four blocks; ``seqopt export`` in
 every format. Steps of the plan, up to 12 spread over the build and the last, are put to the
 certificate of stability with mortar on the true faces. Of more than 120 blocks, nodes at most 6
-joints from the newest are candidates, of more than 300 those at most 3 away. Of one file every plan
-lies outside the linear range: the limit is lifted for it, and its plan says so.
+joints from the newest are candidates, of more than 300 those at most 3 away. Of five files every
+plan lies outside the linear range: the limit is lifted for them, and their plans say so.
 
 The claim holds if every file ends in a plan whose choice is proven optimal among its candidates and
 that goes out in every format, or in one line; at least eight have such a plan; no verdict on a step
@@ -69,6 +69,7 @@ class Outside:
     asked: tuple[str, ...] = ()  # of ``seqopt optimize``
 
 
+LIFTED = ("--limit", "linear_range=any")  # blocks move farther than it, whatever is chosen
 OVERLAP = "--accept-overlaps"  # blocks that were curved run into each other by up to 92 mm
 
 
@@ -86,9 +87,7 @@ SAMPLES = (
     *(_sample(kind, "0") for kind in ("cube-curve-short", "cube-curve-tall", "cubes")),
     _sample("snake", "0", "--gap", "0.01"),
     _sample("armadillo", "", OVERLAP),  # it marks no supports, and nothing in it stands level
-    replace(  # it marks them; its blocks move farther than the model holds, whatever is chosen
-        _sample("armadillo_cra", "", OVERLAP), asked=("--limit", "linear_range=any")
-    ),
+    replace(_sample("armadillo_cra", "", OVERLAP), asked=LIFTED),  # it marks them
 )
 
 
@@ -96,13 +95,15 @@ def _assembly(path: str, *words: str) -> Outside:
     return Outside("compas_assembly", f"{path}.json", ("--unit", "m", "--density", "2400", *words))
 
 
+def _example(name: str, asked: tuple[str, ...] = ()) -> Outside:
+    return replace(_assembly(f"docs/examples/{name}_assembly"), asked=asked)
+
+
 LARGE = ("--unit", "m")  # with a density of its own
 BARREL = "scripts/DEM_Analysis_References/Barrel_Vault"
 ELSEWHERE = (
-    *(
-        _assembly(f"docs/examples/{name}_assembly")
-        for name in ("arch", "stack", "wall", "crossvault")
-    ),
+    *(_example("arch", LIFTED), _example("stack"), _example("wall")),
+    _example("crossvault", LIFTED),
     _assembly("docs/examples/dome_assembly", "--gap", "0.01", OVERLAP),
     _assembly("docs/examples/two-blocks_assembly"),
     *(_assembly(f"data/__temp/{name}") for name in ("wall_courses", "wall_interfaces")),
@@ -110,7 +111,10 @@ ELSEWHERE = (
     *(_assembly(f"data/__temp/{name}") for name in ("stack", "ursula")),
     _assembly("data/__temp/amiens_internet"),
     Outside("compas_dem", "data/dem_crossvault.json"),
-    *(Outside("compas_dem", f"{BARREL}/DEM_{name}.json", LARGE) for name in ("model", "problem")),
+    *(
+        Outside("compas_dem", f"{BARREL}/DEM_{name}.json", LARGE, LIFTED)
+        for name in ("model", "problem")
+    ),
     *(Outside("compas_dem", f"data/{name}.obj") for name in ("wall", "dome", "ursula")),
     Outside("compas_dem", "data/pavillionvault/blocks.json"),
 )
