@@ -30,7 +30,7 @@ def responses_are_computed_once():
     def kept(engine, block):
         if not isinstance(engine, ComplianceEngine):
             return own(engine, block)
-        asked = block.bricks, block.names, block.screen, block.props, block.compiled
+        asked = block.bricks, block.names, block.screen, block.props, block.compiled, block.errors
         grips = block.grips.shape, block.grips.tobytes()
         key = engine.network.scene, engine._accuracy, asked, grips
         if key not in known:
