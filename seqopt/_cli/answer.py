@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import IntEnum
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from seqopt._cli.terminal import complain, show, show_text
+from seqopt._registry import Later
 from seqopt.errors import (
     InfeasibleError,
     MechanismError,
@@ -23,7 +24,7 @@ from seqopt.errors import (
     WorkerError,
 )
 
-NOT_IN_JSON = {"NaN": None, "Infinity": "inf", "-Infinity": "-inf"}  # and what is said in its place
+FILES = Later("seqopt.exchange._files")  # of ``--json`` alone
 LESS = "take fewer bricks, robots that reach less, or a computer with more memory"
 
 
@@ -115,7 +116,7 @@ def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) ->
             "failures": answer.failures,
             "exit_status": answer.status,
         }
-        show(json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
+        show(json.dumps(FILES.json_value(document), indent=2, allow_nan=False) + "\n")
     elif quiet:
         paths = "".join(f"{path}\n" for path in answer.written)
         show(answer.data or paths or f"{answer.text}\n")
@@ -127,29 +128,3 @@ def print_answer(answer: Answer, command: str, *, quiet: bool, as_json: bool) ->
     for text in (*(() if quiet else answer.notes), *answer.failures):
         complain(text)
     return answer.status
-
-
-def plain(value: object) -> Any:
-    """Convert a value to types of JSON, numbers with all digits.
-
-    NaN becomes null, an infinite number the string ``inf`` or ``-inf``, a table a list of rows.
-
-    >>> plain({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
-    {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
-    """
-    return json.loads(json.dumps(value, default=_unpacked), parse_constant=NOT_IN_JSON.get)
-
-
-def _unpacked(value: Any) -> Any:
-    """Return the contents of a table, an array, an enumeration's member or another value."""
-    if hasattr(value, "to_dict"):
-        return value.to_dict(orient="records")
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, Sequence | set | frozenset):
-        return list(value)
-    if callable(value):
-        return value()
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    return value.value if isinstance(value, Enum) else str(value)

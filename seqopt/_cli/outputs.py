@@ -1,43 +1,17 @@
-"""Inputs and outputs of commands: given steps, tables, and what is said of folders."""
+"""Steps that commands are given."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-import pandas as pd
-
 from seqopt._cli.signatures import Call
-from seqopt._files import PAGE, write_file
 from seqopt.engines.registry import find_engine
-from seqopt.exchange._files import csv_text
 from seqopt.plan.build import GivenSequence
 from seqopt.questions import Given, find_steps
 from seqopt.scene.scene_file import plan_folder
 from seqopt.sequence.methods import METHODS
 from seqopt.work import Tell
-
-ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
-
-
-def put_table(
-    path: Path | None, table: pd.DataFrame | Sequence[Mapping[str, object]], said: str
-) -> dict[str, Any]:
-    """Write a table, and return the entries of its answer; without a file the table is the text."""
-    if path is None:
-        return {"data": csv_text(table)}
-    write_file(path, csv_text(table))
-    return {"text": f"{said} written to {path}", "written": (path,)}
-
-
-def written_to(
-    folder: Path | None, *, tables: str = "the plan, its tables", what: str = "it step by step"
-) -> str:
-    """Describe the folder and its page, or how to request one; ``what``: that the page shows."""
-    if folder is None:
-        return f"--out DIR writes {tables} and a page that shows {what}"
-    return f"written to {folder}; {folder / PAGE} shows {what}"
 
 
 def read_steps(words: Mapping[str, Any], tell: Tell) -> tuple[Given, tuple[str, ...]]:

@@ -12,6 +12,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from types import FrameType
+from typing import NoReturn
 
 INTERRUPTED, FAILED, CRASHED = 130, 4, 70  # as `Status`, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
@@ -39,18 +40,18 @@ def run() -> int:
         _answer_signals(signal.default_int_handler)
         status = main()
     except KeyboardInterrupt:
-        with contextlib.suppress(OSError, AttributeError):
-            sys.stderr.write("seqopt: interrupted\n")
-        status = INTERRUPTED
+        _leave()
     except (ImportError, MemoryError) as error:  # as where a limit of memory lets nothing be loaded
-        with contextlib.suppress(OSError, AttributeError):
-            said = " ".join(f"{type(error).__name__} {error}".split())
-            sys.stderr.write(
-                f"seqopt: cannot start: {said}; give it more memory, or reinstall it\n"
-            )
+        said = " ".join(f"{type(error).__name__} {error}".split())
+        _tell(f"seqopt: cannot start: {said}; give it more memory, or reinstall it\n")
         return FAILED
     except Exception as error:  # Python itself would end with the status of what does not hold
-        return _crashed(error)
+        said = " ".join(f"{type(error).__name__}: {error}".split())[:500]
+        lines = "".join(traceback.format_exception(error))
+        lines += f"seqopt: internal error: {said}; this is a fault of seqopt: report it\n"
+        shown = (c if c == "\n" or c.isprintable() else repr(c)[1:-1] for c in lines)
+        _tell("".join(shown))  # names of files may steer a terminal
+        return CRASHED
     if status == INTERRUPTED:  # else Python may end by the signal, where it met an exec of text
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, AttributeError):
@@ -60,15 +61,9 @@ def run() -> int:
     return status
 
 
-def _crashed(error: Exception) -> int:
-    """Print the traceback of an internal error, its last line a summary; return its status."""
+def _tell(text: str) -> None:
     with contextlib.suppress(OSError, AttributeError, ValueError):
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:500]
-        lines = "".join(traceback.format_exception(error))
-        lines += f"seqopt: internal error: {said}; this is a fault of seqopt: report it\n"
-        shown = (c if c == "\n" or c.isprintable() else repr(c)[1:-1] for c in lines)
-        sys.stderr.write("".join(shown))  # names of files may steer a terminal
-    return CRASHED
+        sys.stderr.write(text)
 
 
 def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:
@@ -79,7 +74,7 @@ def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:
             signal.signal(number, answer)
 
 
-def _leave(*_: object) -> None:
+def _leave(*_: object) -> NoReturn:
     """Exit at once: before the start there are no files to clean up."""
     with contextlib.suppress(OSError):
         os.write(2, b"seqopt: interrupted\n")

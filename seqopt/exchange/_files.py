@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import os
 import tempfile
 from collections.abc import Callable, Container, Mapping, Sequence
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from seqopt._files import HIDDEN, _put_all, _told, make_folder
+from seqopt._files import HIDDEN, PAGE, _put_all, _told, make_folder, write_file
 from seqopt.errors import FileError, SeqoptError
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.methods import SCHEDULES
@@ -145,6 +147,38 @@ def listed(rows: Sequence[Mapping[str, Any]], counts: Container[str] = ()) -> li
     return ["  ".join(line) for line in zip(*wide, strict=True)]
 
 
+_NOT_IN_JSON = {"NaN": None, "Infinity": "inf", "-Infinity": "-inf"}  # what is said in its place
+
+
+def json_value(value: object) -> Any:
+    """Convert a value to types of JSON, numbers with all digits.
+
+    NaN becomes null, an infinite number the string ``inf`` or ``-inf``, a table a list of rows.
+
+    >>> json_value({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
+    {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
+    """
+    return json.loads(json.dumps(value, default=_unpacked), parse_constant=_NOT_IN_JSON.get)
+
+
+def _unpacked(value: Any) -> Any:
+    """Return the contents of a table, an array, an enumeration's member or another value."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict(orient="records")
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, Sequence | set | frozenset):
+        return list(value)
+    if callable(value):
+        return value()
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return value.value if isinstance(value, Enum) else str(value)
+
+
+ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
+
+
 class Output:
     """Where a command writes, if it does, and what it reads, which it never overwrites."""
 
@@ -174,3 +208,16 @@ class Output:
         self.keep_apart(*(self.path / name for name in made))
         write_folder(self.path, made)
         return (self.path,)
+
+    def put(self, text: str, said: str) -> dict[str, Any]:
+        """Write a file, and return the entries of its answer; without a file that prints it."""
+        if self.path is None:
+            return {"data": text}
+        write_file(self.path, text)
+        return {"text": f"{said} written to {self.path}", "written": (self.path,)}
+
+    def said(self, *, tables: str = "the plan, its tables", what: str = "it step by step") -> str:
+        """Describe folder and page, or how to request one; ``what``: that the page shows."""
+        if self.path is None:
+            return f"--out DIR writes {tables} and a page that shows {what}"
+        return f"written to {self.path}; {self.path / PAGE} shows {what}"

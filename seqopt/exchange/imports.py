@@ -16,6 +16,7 @@ from seqopt.exchange._building import build_scene
 from seqopt.exchange._content import Given
 from seqopt.exchange._files import read_table
 from seqopt.exchange._formats import read_file
+from seqopt.responses.quantities import length_text
 from seqopt.scene._checks import LARGEST_NUMBER, printable, short
 from seqopt.scene.scenarios import _moved
 from seqopt.scene.scene import Scene
@@ -103,6 +104,12 @@ def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
             raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
         out[int(values[0])] = tuple(values[1:])
     return out
+
+
+def measured_said(off: float, brick: int) -> str:
+    """Say how far the brick is off, m, that is farthest from where it was planned."""
+    which = "every brick is" if off <= SAME else f"brick {brick} is {length_text(off)} from"
+    return f"as built, {which} where it was planned"
 
 
 def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:

@@ -52,12 +52,11 @@ def plan_files(plan: Plan) -> Files:
         tables["stability"] = plan.stability()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()
+    drawn: Mapping[str, bytes] = {}
     if plan.makespan is not None:
-        tables["times"] = plan.times()
-    files: Files = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
-    if plan.makespan is not None:
-        files |= picture_files("times", lambda _: plan.gantt())
-    return {**files, **task_files(plan)}
+        tables["times"], drawn = plan.times(), picture_files("times", lambda _: plan.gantt())
+    files = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
+    return {**files, **drawn, **task_files(plan)}
 
 
 def task_files(plan: ShownBuild) -> dict[str, str]:
@@ -88,8 +87,7 @@ def plan_pages(
 
 def front_counts(front: Front) -> dict[str, object]:
     """Return number of points, completeness, and run times."""
-    seconds = dict(front.seconds)
-    return {"points": len(front.steps), "complete": front.complete, "seconds": seconds}
+    return {"points": len(front.steps), "complete": front.complete, "seconds": {**front.seconds}}
 
 
 def front_spent(front: Front) -> Spent:

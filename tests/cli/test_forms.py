@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt._cli.answer import plain
 from seqopt._cli.main import main
+from seqopt.exchange._files import json_value
 from seqopt.scene.parts import Sphere
 from seqopt.scene.scene_file import load_scene, save_scene
 from tests.commands import beside_models
@@ -87,10 +87,10 @@ def test_quiet_prints_the_paths_of_what_is_written(capsys, tmp_path):
 
 def test_values_as_json_can_hold_them():
     table = pd.DataFrame({"a": [1, 2], "b": [0.1, np.inf]})
-    assert plain(table) == [{"a": 1, "b": 0.1}, {"a": 2, "b": "inf"}]
-    assert plain({1: np.float64("nan"), "n": np.int64(3)}) == {"1": None, "n": 3}
-    assert plain((True, None, -np.inf, np.arange(2))) == [True, None, "-inf", [0, 1]]
-    assert plain(1 / 3) == 1 / 3
+    assert json_value(table) == [{"a": 1, "b": 0.1}, {"a": 2, "b": "inf"}]
+    assert json_value({1: np.float64("nan"), "n": np.int64(3)}) == {"1": None, "n": 3}
+    assert json_value((True, None, -np.inf, np.arange(2))) == [True, None, "-inf", [0, 1]]
+    assert json_value(1 / 3) == 1 / 3
 
 
 # where the command line reads and writes: files of others, never over its input

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated
 
-from seqopt._cli import outputs, remarks
+from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.outputs import read_build
 from seqopt._cli.signatures import Call
@@ -14,7 +14,7 @@ from seqopt._cli.words import File
 from seqopt.arms._kept import arm_faults
 from seqopt.engines.registry import level_notes, provenance
 from seqopt.errors import MechanismError, SeqoptError, SolverError
-from seqopt.exchange._files import Output
+from seqopt.exchange._files import Output, csv_text
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.questions import analyze
 from seqopt.responses._faults import _with_faults, analyze_each, faults_said
@@ -51,7 +51,8 @@ def run(
     $ seqopt analyze arch25 --method sequential --json
     """
     words = asked.words
-    Output(out, words.get("scene"), words.get("plan")).keep_apart(out)
+    output = Output(out, words.get("scene"), words.get("plan"))
+    output.keep_apart(out)
     build, taken = read_build(words, progress)
     faults, within = dict[int, SeqoptError](), LinearRange(build.engine)
     scene, steps = build.engine.network.scene, build.steps
@@ -66,7 +67,7 @@ def run(
         failures=tuple(f"seqopt: {each}" for each in faults_said(faults, len(steps))),
         status=_status_of(faults),
         notes=(*taken, *level_notes(words.get("engine"), build.engine)),
-        **outputs.put_table(out, whole, counted),
+        **output.put(csv_text(whole), counted),
     )
     if table.empty:
         return answer

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any
 
-from seqopt._cli import outputs
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.outputs import read_steps
 from seqopt._cli.signatures import Call
@@ -116,7 +115,7 @@ def _answer(
         unsure = _steps_in_words([*dict.fromkeys(undecided)])
         failures = (f"seqopt: solver failed: {unsure}: undecided; this says nothing about them",)
         status = Status.FAILED
-    said = outputs.put_table(output.path, rows, "\n".join(lines) + ";")
+    said = output.put(csv_text(rows), "\n".join(lines) + ";")
     if output.path is None:
         said["text"] = "\n".join(
             [*lines, "", *listed(rows, COUNTS), "", "--out FILE or --quiet: as CSV"]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import pandas as pd
 
-from seqopt._cli import outputs, remarks
+from seqopt._cli import remarks
 from seqopt._cli.answer import Answer
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import columns, wrapped
@@ -62,7 +62,7 @@ def run(asked: Annotated[Call, ("call", compare)], *, out: Folder = None, progre
     if result.speed is not None:
         blocks.append("\n".join([SPEED, str(result.speed)]))
         facts = {"speed": result.speed.facts()}
-    blocks.append(wrapped(outputs.written_to(out, tables="tables", what=WHAT)))
+    blocks.append(wrapped(output.said(tables="tables", what=WHAT)))
     answer = Answer(
         about | {"criterion": costs.name, **_facts(result)} | facts,
         "\n\n".join(blocks),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -72,7 +71,8 @@ def write(asked: Annotated[Call, ("call", export)], *, out: File = None, progres
     $ seqopt export best --format tasks --distance 0.15 --out tasks.json
     """
     words, format = asked.words, asked.words.get("format", "tasks")  # noqa: A001
-    Output(out, words.get("scene"), words.get("plan"), words.get("source")).keep_apart(out)
+    output = Output(out, words.get("scene"), words.get("plan"), words.get("source"))
+    output.keep_apart(out)
     (given, notes), form = read_steps(words, progress), formats()[format]
     scene, steps = given.network.scene, given.steps
     if "distance" in form.takes and scene.has_arms:
@@ -85,9 +85,5 @@ def write(asked: Annotated[Call, ("call", export)], *, out: File = None, progres
     if lost:
         plan = "" if "steps" in lost else f" and {said}"
         said = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"
-    facts = {"steps": len(steps), "format": format}
-    answer = Answer(facts, notes=notes, scene=scene)
-    if out is None:
-        return replace(answer, facts=facts | {"text": text}, data=text)
-    write_file(out, text)
-    return replace(answer, text=f"{said} written to {out}", written=(out,))
+    facts = {"steps": len(steps), "format": format, **({} if out else {"text": text})}
+    return Answer(facts, **output.put(text, said), notes=notes, scene=scene)

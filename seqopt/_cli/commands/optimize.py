@@ -8,15 +8,14 @@ from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
-from seqopt._cli import outputs, remarks
+from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.outputs import ALWAYS
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt._registry import Later
 from seqopt.engines.registry import engine_mortar, level_notes
-from seqopt.exchange._files import Output
+from seqopt.exchange._files import ALWAYS, Output
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
@@ -158,7 +157,7 @@ def _lines(
         counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
     counts.append(f"{plan.models:,} models")
     search = f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
-    yield f"{search}; {outputs.written_to(output.path)}"
+    yield f"{search}; {output.said()}"
     if plan.certificate is not None and plan.standing is not None:
         yield from map(wrapped, TIMES.waits_said(plan))
     yield from (f"stability, {each}" for each in verdicts.get(plan.title, ()))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Annotated
 
 import pandas as pd
 
-from seqopt._cli import outputs, remarks
+from seqopt._cli import remarks
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import Folder
@@ -30,8 +28,6 @@ from seqopt.work import INTERRUPT, Tell
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal
-Departures = Mapping[str, Sequence[Departure]]
-Verdicts = Mapping[str, Sequence[BuildVerdicts]]
 
 
 def run(
@@ -91,24 +87,19 @@ def run(
         *(figure_notes() if written else ()),
         *([remarks.spent_said(front_spent(front))] if details else []),
     )
-    answer = _answer(front, free.engine, output, written)
-    answer = remarks.marked(answer, builds_in_words(left), beyond=front.beyond)
-    return replace(answer, notes=(*answer.notes, *notes))
-
-
-def _answer(front: Front, engine: Engine, output: Output, written: tuple[Path, ...]) -> Answer:
-    """Return the answer of a Pareto set that is written, if it is."""
-    early, scene = front.stopped == INTERRUPT, engine.network.scene
-    shown = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
+    early = front.stopped == INTERRUPT
+    points = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
-    return Answer(
+    answer = Answer(
         {**front_counts(front), "points": shown_table(front.table)},
-        f"{shown}{said}; {outputs.written_to(output.path)}",
+        f"{points}{said}; {output.said()}",
         written=written,
+        notes=notes,
         failures=(INTERRUPTED,) if early else (),
         status=Status.INTERRUPTED if early else Status.DONE,
-        scene=scene,
+        scene=free.engine.network.scene,
     )
+    return remarks.marked(answer, builds_in_words(left), beyond=front.beyond)
 
 
 def _by_engine(front: Front) -> dict[Engine, dict[str, Sequence[Step]]]:
@@ -119,7 +110,7 @@ def _by_engine(front: Front) -> dict[Engine, dict[str, Sequence[Step]]]:
     return found
 
 
-def _responses(front: Front) -> tuple[dict[str, pd.DataFrame], Departures]:
+def _responses(front: Front) -> tuple[dict[str, pd.DataFrame], dict[str, Sequence[Departure]]]:
     """Return the responses of the steps of every plan, and where they leave the linear range."""
     each, left = dict[str, pd.DataFrame](), dict[str, Sequence[Departure]]()
     for own, builds in _by_engine(front).items():

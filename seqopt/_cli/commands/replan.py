@@ -8,13 +8,12 @@ from typing import Annotated, Any
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import answered
-from seqopt._cli.outputs import ALWAYS
 from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import Folder
 from seqopt.engines.registry import engine_mortar
-from seqopt.exchange._files import Output
-from seqopt.exchange.imports import SAME
+from seqopt.exchange._files import ALWAYS, Output
+from seqopt.exchange.imports import measured_said
 from seqopt.plan.plan import Plan
 from seqopt.questions import replan
 from seqopt.responses._tolerance import values_text
@@ -84,13 +83,9 @@ def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
     else:
         line = f"as planned the rest takes: {values_text(was)}"
     if "off_m" in facts:
-        off, left = length_text(facts["off_m"]), length_text(facts["tolerance_left_m"])
-        which = "every brick is"
-        if facts["off_m"] > SAME:
-            which = f"brick {facts['off_brick']} is {off} from"
-        line = (
-            f"as built, {which} where it was planned; grips of the rest may be {left} off; {line}"
-        )
+        left = length_text(facts["tolerance_left_m"])
+        as_built = measured_said(facts["off_m"], facts["off_brick"])
+        line = f"{as_built}; grips of the rest may be {left} off; {line}"
     if facts["differs"] is None:
         return (line, "the new plan is the old one")
     counts = f"{facts['steps']} steps instead of {facts['steps_before']}"
