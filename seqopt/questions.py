@@ -13,7 +13,7 @@ import pandas as pd
 
 from seqopt._files import parse_json, read_text
 from seqopt._registry import Later, required
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import Mortar, _with_friction, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, find_engine
 from seqopt.errors import (
@@ -241,7 +241,7 @@ def assess(  # noqa: PLR0913  # every question is a word of its own
     ['stands', 'stands', 'stands']
     """
     own = find_mortar(mortar)
-    own = own if friction is None else replace(own, friction=friction)
+    own = own if friction is None else _with_friction(own, friction)
     if isinstance(scene, ShownBuild | Path | str) or isinstance(steps, Path | str | None):
         found = find_steps(scene, steps, robots=robots, cache=cache, progress=progress)  # type: ignore[arg-type]
         scene, steps = found.network, found.steps

@@ -83,7 +83,7 @@ WRONG = {
     "brick count 3.5: the scene has 1 to": lambda: ENGINE.solve(3.5, [[1]]),
     "builds: there are none; give one by its name": lambda: failure_map(SCENE, {}),
     "robot: its name is empty; give one": lambda: Robot(name="", payload=1.0),
-    "a coefficient up to 10; 25° is 0.466": lambda: seqopt.assess(SCENE, None, friction=25),
+    "a coefficient up to 2; 25° is 0.466": lambda: seqopt.assess(SCENE, None, friction=25),
     "friction 25: give a coefficient up to 10; 25° is": lambda: Mortar(friction=25),
     "friction 90: give a coefficient up to 10": lambda: replace(seqopt.EPOXY, friction=90.0),
     "it has no robots; give at least one": lambda: seqopt.optimize(SCENE.with_robots(), "free"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -29,9 +29,16 @@ _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 EXAMPLE = "15min, or 5min=0.4,15min=1"
 Points = tuple[tuple[float, float], ...]
 _CUTS = 2  # times that each triangle of a face is cut into four
-ROUGHEST = 10.0  # largest coefficient of friction; more is an angle that was meant
+ROUGHEST = 10.0  # largest coefficient of friction that is tried; more is an angle that was meant
+_ASKED = 2.0  # the same of one that somebody asks for
 _STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
 _CHUNK = 1_000_000  # corners of sets whose stress is held at once
+
+
+def _require_no_angle(friction: float, most: float) -> None:
+    if friction > most:
+        slope = f"; {friction:g}° is {math.tan(math.radians(friction)):.3g}" * (friction < 90)
+        raise SceneError(f"friction {friction:g}: give a coefficient up to {most:g}{slope}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +72,7 @@ class Mortar:
     def __post_init__(self) -> None:
         check(self, "mortar", friction=not_negative)
         check(self, "mortar", tensile_strength=not_negative, cohesion=not_negative)
-        if (given := self.friction) > ROUGHEST:
-            slope = f"; {given:g}° is {math.tan(math.radians(given)):.3g}" * (given < 90)
-            raise SceneError(f"friction {given:g}: give a coefficient up to {ROUGHEST:g}{slope}")
+        _require_no_angle(self.friction, ROUGHEST)
 
 
 _FRICTION = math.tan(math.radians(25.0))
@@ -98,6 +103,12 @@ def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     slides, pulled = mortar.friction - other.friction, other.tensile_strength
     rough = slides == 0 or (slides > 0 and not pulled)
     return rough and mortar.tensile_strength >= pulled and mortar.cohesion >= other.cohesion
+
+
+def _with_friction(mortar: Mortar, friction: float) -> Mortar:
+    """Return a mortar with the coefficient of friction that somebody asks for."""
+    _require_no_angle(friction, _ASKED)
+    return replace(mortar, friction=friction)
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:

@@ -18,6 +18,7 @@ from seqopt.contact.mortar import (
     Mortar,
     _find_curing,
     _mortar_name,
+    _with_friction,
     _with_mortar,
     bond_mortar,
     find_mortar,
@@ -297,7 +298,7 @@ def find_standing(
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands {usual}, say")
         return None
     mortar = find_mortar(stands, "stands")
-    mortar = mortar if friction is None else replace(mortar, friction=friction)
+    mortar = mortar if friction is None else _with_friction(mortar, friction)
     if tilt is not None and not tilt < 90:
         raise ProblemError(f"--tilt {tilt:g}: give an angle from 0 to below 90 degrees")
     cures = _find_curing(" ".join(curing)) if curing else None

@@ -3,8 +3,7 @@
 from enum import Enum
 
 STANDS, FALLS, OPEN = 1, -1, 0  # verdicts in arrays
-ASSESSED = ("bond", "friction", "tilt", "payload")
-"""Margins that are found beside a verdict; the first three can be goals."""
+ASSESSED = ("bond", "friction", "tilt", "payload")  # beside a verdict; the first three as goals
 
 
 class Verdict(Enum):

@@ -22,7 +22,8 @@ BAD = {
     # commands, scenes, files
     "--engine": "COMMAND",
     "analyze arch52 --method sequential": "scene arch52",
-    "assess arch25 --method sequential --friction 25": "a coefficient up to 10; 25° is 0.466",
+    "assess arch25 --method sequential --friction 25": "a coefficient up to 2; 25° is 0.466",
+    f"{FREE} --stands dry --friction 25": "a coefficient up to 2; 25° is 0.466",
     "scene arc:span=2,rise=.8": "did you mean arch?",
     "times arch25 --method cantilever --curing 15min": "give --stands epoxy",
     "optimize BARE --schedule free": "it has no robots; give at least one",

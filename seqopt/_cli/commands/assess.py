@@ -13,7 +13,7 @@ from seqopt._cli.signatures import Call
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.words import File, named
 from seqopt._registry import Later
-from seqopt.contact.mortar import Mortar, _mortar_name, _with_mortar, find_mortar
+from seqopt.contact.mortar import Mortar, _mortar_name, _with_friction, _with_mortar, find_mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.exchange._files import Output, csv_text, listed
@@ -82,7 +82,7 @@ def run(
     (given, taken), rows = read_steps(words, progress), list[dict[str, Any]]()
     values = asked.values(scene=given)
     rough = values["friction"]
-    own = own if rough is None else replace(own, friction=rough)
+    own = own if rough is None else _with_friction(own, rough)
     shown = (own,) if mortar else (Mortar(friction=own.friction), own)  # the last one decides
     mortars = {_mortar_name(each): each for each in shown}
     wanted, shared = find_margins(values["margins"] or ()), (None, values["workers"])
