@@ -42,11 +42,12 @@ ASSESS = ["assess", "chain:bricks=7", "--method", "cantilever"]
 MAIN = "from seqopt._cli.main import load, main\n"
 STAGES = {  # what one interpreter does, one after the other, and what is not loaded then
     "import seqopt": ("numpy", "seqopt.scene", "seqopt._files"),
+    "from seqopt._cli.start import run\nsys.argv[1:] = ['--version']\nassert run() == 0": LIGHT,
     f"{MAIN}main([])": LIGHT,
     "main(['--help'])": LIGHT,
     "main(['--version'])": LIGHT,
     "load(['optimize'])": SELDOM,
-    "main(['optimize', 'chain:bricks=6'])": ("pandas.core",),
+    "main(['optimize', 'chain:bricks=6'])": ("pandas.core", "seqopt.report.comparison"),
     f"load({FREE})\nassert main({FREE}) == 0": LATE,
     f"load({ASSESS})\nassert main({ASSESS}) in (0, 1)": LATE,
     "import seqopt.report\n[getattr(seqopt, n) for n in seqopt.__all__]": ("matplotlib", "cvxpy"),

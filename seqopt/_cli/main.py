@@ -62,7 +62,7 @@ def load(words: Sequence[str]) -> None:
         np = import_module("numpy")
         # few commands need pandas, only the start of SciPy looks at these parts
         sys.modules.setdefault("pandas", Later("pandas"))
-        for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
+        for part in ("ctypeslib", "f2py", "fft", "ma", "polynomial", "random", "testing"):
             if part not in vars(np):
                 vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", Later(f"numpy.{part}"))
         for name in ("seqopt._cli.signatures", "seqopt._cli.watcher"):

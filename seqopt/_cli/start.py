@@ -25,13 +25,14 @@ def run() -> int:
         _prepare()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         from seqopt._cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
-        from seqopt.work import _interrupt_main  # noqa: PLC0415
 
         load(sys.argv[1:])
 
         def raise_again(lost: sys.UnraisableHookArgs) -> None:
             """Repeat an interrupt that was raised where exceptions are ignored."""
             if issubclass(lost.exc_type, KeyboardInterrupt):
+                from seqopt.work import _interrupt_main  # noqa: PLC0415  # 200 ms: it needs SciPy
+
                 threading.Timer(AGAIN, _interrupt_main).start()  # at once it would meet this hook
             else:
                 sys.__unraisablehook__(lost)

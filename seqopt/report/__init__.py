@@ -19,10 +19,18 @@ chain 9: 9 bricks, 3 robots
 from typing import TYPE_CHECKING
 
 from seqopt._registry import later
-from seqopt.report.comparison import Comparison, compare, format_comparison, largest, method_tables
 
 if TYPE_CHECKING:
     from seqopt.report._questions import report
+    from seqopt.report.comparison import (
+        Comparison,
+        compare,
+        format_comparison,
+        largest,
+        method_tables,
+    )
 
 __all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables", "report"]
-__getattr__, __dir__ = later(__name__, {"report": "_questions"})
+__getattr__, __dir__ = later(
+    __name__, dict.fromkeys(__all__, "comparison") | {"report": "_questions"}
+)
