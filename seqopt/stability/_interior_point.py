@@ -50,17 +50,24 @@ class Balance:
     """
 
     def __init__(self, wrenches: sparse.csr_array) -> None:
-        self._map = wrenches
-        self._transposed, blocks = self._map.T.tocsr(), self._map.tobsr((6, 3))
-        bodies, forces = blocks.shape[0] // 6, blocks.shape[1] // 3
+        self._map, self._transposed = wrenches, wrenches.T.tocsr()
+        blocks = wrenches.tobsr((6, 3))
+        bodies, self._force = blocks.shape[0] // 6, blocks.indices
         acts = np.ones(len(blocks.indices)), blocks.indices, blocks.indptr
-        on = sparse.csr_array(acts, shape=(bodies, forces))
+        on = sparse.csr_array(acts, shape=(bodies, blocks.shape[1] // 3))
         order = reverse_cuthill_mckee((on @ on.T).tocsr(), symmetric_mode=True)
         self._order = (6 * order[:, None] + np.arange(6)).ravel()
-        self._ordered = self._map[self._order]
-        self._turned = self._ordered.T.tocsr()
-        rows = np.repeat(np.arange(forces), 3)  # of weights, three of each force
-        self._places = (3 * rows[:, None] + np.arange(3)).ravel(), np.arange(0, 9 * forces + 1, 3)
+        at = np.argsort(order)[np.repeat(np.arange(bodies), np.diff(blocks.indptr))]
+        along = np.lexsort((at, self._force))  # a force acts on one body, or on two
+        two = np.flatnonzero(np.diff(self._force[along]) == 0)
+        self._first = np.concatenate([along, along[two + 1]])
+        second = np.concatenate([along, along[two]])
+        row, column = (6 * at[each][:, None] + np.arange(6) for each in (self._first, second))
+        line = row[:, :, None] - column[:, None]
+        self._lower = line >= 0  # of what is symmetric
+        self._lines = 1 + int(line.max(initial=0))
+        self._entry = (line + self._lines * column[:, None])[self._lower]
+        self._blocks, self._turned = blocks.data, blocks.data[second].swapaxes(1, 2)
 
     def wrench(self, force: Floats) -> Floats:
         """Return the wrenches (6B,) of forces (3, N)."""
@@ -75,13 +82,11 @@ class Balance:
 
         It is that of a system with a larger diagonal, corrected once.
         """
-        weights = sparse.csr_array((weight.transpose(2, 0, 1).ravel(), *self._places))
-        system = (self._ordered @ weights @ self._turned).tocoo()
-        line, size = system.row - system.col, len(self._order)
-        lower, lines = line >= 0, int(line.max(initial=0)) + 1  # of what is symmetric
-        band = np.zeros((lines, size), order="F")
-        band[line[lower], system.col[lower]] = system.data[lower]
-        regular = _REGULAR * np.abs(system.data).max()
+        lines, size = self._lines, len(self._order)
+        weighed = self._blocks @ weight.transpose(2, 0, 1)[self._force]
+        entries = (weighed[self._first] @ self._turned)[self._lower]
+        band = np.bincount(self._entry, entries, lines * size).reshape((lines, size), order="F")
+        regular = _REGULAR * np.abs(band).max(initial=0.0)
         band[0] += regular
         factor = linalg.cholesky_banded(band, lower=True, check_finite=False), True
 
@@ -204,12 +209,13 @@ class _Search:
         self._balance = Balance(sparse.hstack(maps, format="csr"))
 
     @np.errstate(all="ignore")
-    def start(self) -> tuple[_Point, Floats]:
-        """Return the point of least forces in equilibrium, and a motion that nothing hinders."""
+    def start(self, near: Floats | float) -> tuple[_Point, Floats]:
+        """Return the point of forces in equilibrium next to some, and a motion nothing hinders."""
         balance, cones = self._balance, self.cones
         weight = np.repeat(np.eye(3)[:, :, None], cones.owners, axis=2)
-        motion = balance.solver(weight)(self.load)
-        force = -balance.parting(motion)
+        force = np.zeros((3, cones.owners)) + near
+        motion = balance.solver(weight)(self.load + balance.wrench(force))
+        force -= balance.parting(motion)
         loose = np.abs(self.load + balance.wrench(force)).max() > _DONE
         slack = cones.of(force)
         slack[0] += cones.most
@@ -288,18 +294,21 @@ class _Search:
         return Answer(Claim.SOLVED, max(point.raised, 0.0), contact, grip, motion)
 
 
-def approach(assembly: Assembly, case: Case, blocks: Bools | None = None) -> Iterator[Answer]:
+def approach(
+    assembly: Assembly, case: Case, blocks: Bools | None = None, near: Floats | float = 0.0
+) -> Iterator[Answer]:
     """Yield forces and motions, each nearer to a proof that a case needs no z, or some.
 
-    The first answer has the least forces in equilibrium, and claims no z. Ends when no better one
-    is found, or after `ROUNDS`. ``blocks`` (B,): that move, by default all.
+    The first answer has the forces in equilibrium that differ least from ``near`` (K + G, 3), over
+    the force scale, by default none, and claims no z. Ends when no better one is found, or after
+    `ROUNDS`. ``blocks`` (B,): that move, by default all.
     """
     blocks = np.ones(len(assembly.centroid), dtype=bool) if blocks is None else blocks
     if not (blocks.any() and len(assembly.corner) + len(assembly.payload)):
         return
     try:
         search = _Search(assembly, case, blocks)
-        point, motion = search.start()
+        point, motion = search.start(np.transpose(near))
         yield search.claim(replace(point, raised=0.0, motion=motion))
         for _ in range(ROUNDS - 1):
             better = search.better(point)

@@ -95,6 +95,11 @@ def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
     return Proven(proven, proven, np.nan, answer) if proven > _CLEAR else None
 
 
+def _of_grips(force: Mapping[int, Floats], held: Sequence[int]) -> Floats:
+    """Return the forces of grips (G, 3) by the nodes that they hold, zero at others."""
+    return np.array([force.get(node, np.zeros(3)) for node in held]).reshape(-1, 3)
+
+
 class VerdictChain:
     """Proves of one partial structure after the other whether it stands with a mortar.
 
@@ -115,7 +120,7 @@ class VerdictChain:
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = bonded(assembly, self._mortar)
         with _one_thread():
-            tries = chain(self._known(assembly, held), self._sought(assembly, case))
+            tries = chain(self._known(assembly, held), self._sought(assembly, case, held))
             each = ((judged(assembly, case, answer), way) for answer, way in tries)
             known = next(((proven, way) for proven, way in each if proven is not None), None)
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
@@ -136,13 +141,18 @@ class VerdictChain:
             falls.append((claim, Way.EARLIER_MOTION))
         for corner, grip in self._kept:  # with fewer grips: one more bears nothing
             if len(corner) == len(assembly.corner) and grip.keys() <= set(held):
-                borne = np.array([grip.get(node, np.zeros(3)) for node in held]).reshape(-1, 3)
-                claim = Answer(Claim.SOLVED, 0.0, corner / force, borne / force, still)
+                borne = _of_grips(grip, held) / force
+                claim = Answer(Claim.SOLVED, 0.0, corner / force, borne, still)
                 holds.append((claim, Way.EARLIER_FORCES))
         yield from [*holds, *falls] if self._stood else [*falls, *holds]
 
-    def _sought(self, assembly: Assembly, case: Case) -> Iterator[tuple[Answer, Way]]:
-        """Yield forces and motions sought for this case: first near what fell last, then in all."""
+    def _sought(
+        self, assembly: Assembly, case: Case, held: Sequence[int]
+    ) -> Iterator[tuple[Answer, Way]]:
+        """Yield forces and motions sought for this case: first near what fell last, then in all.
+
+        The search in all begins with the forces that held the last structure that stood.
+        """
         if self._motion is not None and not self._stood:
             size = np.abs(self._motion).max(axis=1)
             falls = np.ones(len(assembly.centroid), dtype=bool)  # new ones as well
@@ -155,7 +165,11 @@ class VerdictChain:
                 if answer.value <= _TIGHT:
                     break  # others may fall
                 yield answer, Way.FORCES
-        yield from ((answer, Way.FORCES) for answer in approach(assembly, case))
+        last, corners = np.zeros((len(assembly.corner) + len(held), 3)), len(assembly.corner)
+        for corner, grip in self._kept[-1:]:
+            last[: min(corners, len(corner))] = corner[:corners] / assembly.scales[0]
+            last[corners:] = _of_grips(grip, held) / assembly.scales[0]
+        yield from ((answer, Way.FORCES) for answer in approach(assembly, case, None, last))
 
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
         (force, length), answer = assembly.scales, proven.answer

@@ -283,9 +283,9 @@ def test_what_is_sought_near_what_fell_is_proven_of_the_whole(lie, monkeypatch):
     monkeypatch.setattr(chain, "_NEAR", 1.0)
     asked, real = [], chain.approach
 
-    def watched(assembly, case, blocks=None):
+    def watched(assembly, case, blocks=None, near=0.0):
         asked.append(blocks is not None)
-        found = real(assembly, case, blocks)
+        found = real(assembly, case, blocks, near)
         shape = (len(assembly.centroid), 6)
         return (replace(a, motion=np.ones(shape)) if lie and asked[-1] else a for a in found)
 
