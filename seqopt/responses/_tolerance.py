@@ -126,7 +126,7 @@ def _misplaced(engine: Engine, bricks: int, grips: Ints) -> Misplaced:
     return Misplaced(own.reshape(-1, 3), np.ascontiguousarray(influence), most)
 
 
-def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
+def tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
     """Return which sets (S,) have two rigid grips on one brick."""
     kinds = engine.network.scene.grip_kinds
     brick = grip_columns(engine.network, bricks, grips) // 2
@@ -144,7 +144,7 @@ def misfits(engine: Engine, bricks: int, grips: Ints) -> Floats:
     held = grips.shape[1]
     if not bricks:  # the empty site: nobody holds
         return np.zeros(len(grips))
-    out = np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
+    out = np.where(tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
     rows = np.flatnonzero(out == 0) if held else np.arange(0)
     step = max(1, _AT_ONCE // (3 * held + 1))
     for start in range(0, len(rows), step):
@@ -163,7 +163,7 @@ def step_tolerance(engine: Engine, step: Step) -> Tolerance:
     holding += [prop.label for prop in scene.standing_props(step.bricks, held=bool(holding))]
     if not holding:
         return Tolerance(np.inf, np.inf)
-    if _tied(engine, step.bricks, grips)[0]:
+    if tied(engine, step.bricks, grips)[0]:
         return Tolerance(0.0, 0.0, "two rigid grips on one brick")
     forces = _misplaced(engine, step.bricks, grips)
     rates, direction = worst_rates(forces)

@@ -32,7 +32,7 @@ from seqopt.engines.registry import AutoEngine, _chooser_of, recipe_of, simplest
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
-from seqopt.responses._tolerance import misfits
+from seqopt.responses._tolerance import misfits, tied
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
     RESPONSES,
@@ -552,6 +552,9 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     if any((np.abs(np.asarray(force)) > robot.payload).any() for robot, force in carried):
         return ""
     places = [(name, *one) for name, each in builds.items() for one in _held_in_table(scene, each)]
+    every = ((bricks, np.array([held], dtype=np.int64)) for *_, bricks, held in places if bricks)
+    if any(tied(within.engine, *one).any() for one in every):
+        return ""  # two rigid grips on one brick have no tolerance
     new = {(bricks, len(held), held) for *_, bricks, held in places if (bricks, held) not in known}
     for (bricks, count), same in groupby(sorted(new), key=itemgetter(0, 1)):
         sets = [held for *_, held in same]
@@ -561,7 +564,7 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
             known[bricks, held] = off
     name, step, bricks, held = min(places, key=lambda place: known[place[2], place[3]])
     off = known[bricks, held]
-    if not 0 < off < np.inf:  # two rigid grips on one brick have no tolerance
+    if not 0 < off < np.inf:
         return ""
     where = f"step {step}{f' of {name}' if len(builds) > 1 else ''}"
     return f" (rigid grips {length_text(off)} off exceed a payload: {where})"
