@@ -27,12 +27,13 @@ from formulations._search import (
 from formulations.times._labels import Carrying
 from formulations.times._stages import ALMOST, Goals, Least, StageFound, Stages, by_labels
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
-from seqopt.graph._spaces import build_space, seen_steps
+from seqopt.graph._spaces import build_space
 from seqopt.graph.formulation import Solution, Watch
 from seqopt.graph.graph import PEAK, TIME, tied
 from seqopt.graph.space import Explorer, Visited
 from seqopt.graph.states import States
-from seqopt.problem.amounts import MINMAX, SUM
+from seqopt.problem.amounts import MINMAX, NONE, SUM
+from seqopt.problem.requirements import StepArrays
 from seqopt.times._curing import CuringBuilds, FallCuts
 from seqopt.times._graph import timed_graph
 from seqopt.times._steps import StepTime, reassigned_steps, step_times
@@ -187,13 +188,25 @@ def _staged(
     if problem.is_timed:
         timed = timed_graph(problem, visited, waits.cuts)
     levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
-    seen = seen_steps(problem, visited) if problem.paths else None
+    seen = _seen_steps(problem, visited) if problem.paths else None
     carrying = Carrying(graph, levels, timed, problem.paths, seen)
     stages = Stages(asked, visited, least, watch, carrying)
     try:
         return visited, stages, stages.run()
     except InfeasibleError as error:
         raise wide.without_plan(str(error)) from None
+
+
+def _seen_steps(problem: States, visited: Visited) -> StepArrays:
+    """Return the moves among visited states as resources see them."""
+    space, graph = problem.space, visited.graph
+    rows = np.concatenate([own[:, : space.robots] for *_, own in visited.states])
+    counts = [len(own) for *_, own in visited.states]
+    bricks = np.repeat([space.bricks_at(level) for level, *_ in visited.states], counts)
+    nodes = np.full((len(rows), len(problem.network.scene.robots)), NONE)
+    numbers = np.array([NONE, *problem.network.scene.placed_nodes])
+    nodes[:, problem.robots] = numbers[rows.clip(min=0)]
+    return StepArrays(bricks[graph.target], nodes[graph.source], nodes[graph.target])
 
 
 def _least_of(plans: Sequence[Solution], bound: tuple[float, ...], stopped: str = "") -> Solution:

@@ -20,11 +20,10 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph.graph import FAILS, PASSES, _lazy_path
-from seqopt.graph.space import Explorer, Found, Moves, Space, Visited
+from seqopt.graph.space import Explorer, Found, Moves, Space
 from seqopt.graph.states import States
-from seqopt.problem.amounts import NONE, STEPS, Amount, MoveArrays
+from seqopt.problem.amounts import STEPS, Amount, MoveArrays
 from seqopt.problem.problem import Orders
-from seqopt.problem.requirements import StepArrays
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence import _space as free_space
 from seqopt.sequence._space import FreeSpace, ScheduleSpace, sort_entries
@@ -161,18 +160,6 @@ class StateSpace(_PosedSpace):
         held = states[:, : self.problem.space.robots].astype(np.int64)
         named = np.where(held > 0, numbers[held.clip(min=0)], 0)
         return np.column_stack([np.full(len(held), part), named])
-
-
-def seen_steps(problem: States, visited: Visited) -> StepArrays:
-    """Return the moves among visited states as resources see them."""
-    space, graph = problem.space, visited.graph
-    rows = np.concatenate([own[:, : space.robots] for *_, own in visited.states])
-    counts = [len(own) for *_, own in visited.states]
-    bricks = np.repeat([space.bricks_at(level) for level, *_ in visited.states], counts)
-    nodes = np.full((len(rows), len(problem.network.scene.robots)), NONE)
-    numbers = np.array([NONE, *problem.network.scene.placed_nodes])
-    nodes[:, problem.robots] = numbers[rows.clip(min=0)]
-    return StepArrays(bricks[graph.target], nodes[graph.source], nodes[graph.target])
 
 
 def _joined(found: Sequence[tuple[free_space.Moves, bool]], states: Ints) -> Moves:

@@ -467,7 +467,6 @@ class CandidateCosts:
         self._problem = problem
         self._candidates: dict[int, Candidates] = {}
         self._costs: dict[tuple[int, bool], Floats] = {}
-        self._solved = set[int]()  # brick counts
 
     def among(self, level: int, states: Ints, *, alone: bool = False) -> Floats:
         """Return costs of states (n,) among all candidates of their level; zero if none is open.
@@ -481,7 +480,6 @@ class CandidateCosts:
         if (level, alone) not in self._costs:
             if alone and isinstance(criterion, RankSum):
                 criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
-            self._solve_alike(level)
             found = problem.seen(level, candidates.states, rough=True).responses
             shaped = {name: candidates.spread(values) for name, values in found.items()}
             self._costs[level, alone] = self._relative(level, criterion, shaped)
@@ -491,15 +489,6 @@ class CandidateCosts:
         if level not in self._candidates:
             self._candidates[level] = self._problem.space.candidates(level)
         return self._candidates[level]
-
-    def _solve_alike(self, level: int) -> None:
-        """Solve the candidates of all levels with as many bricks in one batch, once."""
-        space = self._problem.space
-        if (bricks := space.bricks_at(level)) not in self._solved:
-            self._solved.add(bricks)
-            alike = [k for k in range(space.levels + 1) if space.bricks_at(k) == bricks]
-            every = [self._of(k).states for k in alike if space.open_columns(k)]
-            self._problem.seen(level, np.concatenate(every), rough=True)
 
     def _relative(self, level: int, criterion: Criterion, found: Mapping[str, Floats]) -> Floats:
         """Return costs of choices by their responses; infinite where one is impossible."""
