@@ -42,8 +42,8 @@ without these dynamic programming gives the same answer hundreds of times faster
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cvxpy as cp
@@ -263,9 +263,12 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
         if graph.ends[0]:
             return Choice((), (0.0,) * len(graph.peaks))
         path, bounds, seconds = at_hand(graph), list[float](), 0.0
-        sums: list[tuple[int, float]] = []
+        sums = dict[int, float]()
         for goal in range(graph.goals):
-            written = write(_one_goal(graph, goal, sums))
+            columns = [goal, *sums, *range(graph.goals, len(graph.peaks))]
+            peaks = (graph.peaks[goal], *[False] * (len(columns) - 1))
+            amounts, caps = graph.amounts[:, columns], (*sums.values(), *graph.caps)
+            written = write(replace(graph, amounts=amounts, peaks=peaks, caps=caps))
             found = minimize_by_highs(
                 written.program,
                 feasible=bool(goal) or not graph.caps,
@@ -285,18 +288,10 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
             if graph.peaks[goal]:
                 graph = graph.only(graph.amounts[:, goal] <= tied(least))
             else:
-                sums.append((goal, least))
+                sums[goal] = least
         return Choice(path, tuple(bounds), compile_seconds=seconds)
 
     return choose
-
-
-def _one_goal(graph: Graph, goal: int, sums: Sequence[tuple[int, float]]) -> Graph:
-    """Return the graph with one goal, the sums before it and the budgets being capped."""
-    columns = [goal, *(column for column, _ in sums), *range(graph.goals, len(graph.peaks))]
-    peaks = (graph.peaks[goal], *[False] * (len(columns) - 1))
-    arcs, caps = (graph.source, graph.target), (*(most for _, most in sums), *graph.caps)
-    return Graph(*arcs, graph.amounts[:, columns], peaks, graph.ends, caps, graph.alone)
 
 
 def _whole(graph: Graph) -> WholeProgram:

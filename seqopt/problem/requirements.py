@@ -660,7 +660,9 @@ def _limit_of(text: str, where: str) -> Limit:
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
     if name == TOLERANCE or UNITS.get(name[0]) == "m":
-        return Limit(name, _length_word(value, said))
+        unit = next((unit for unit in _LENGTHS if value.endswith(unit)), "")
+        number = number_word(value.removesuffix(unit), said, "m, or a length as 20um or 0.02mm")
+        return Limit(name, number * _LENGTHS.get(unit, 1.0))
     return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
 
 
@@ -710,13 +712,6 @@ def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) ->
         said = f"{text!r} is not a positive number{' or zero' * zero}{most}"
         raise ProblemError(f"{where}: {said}{f'; give a number of {unit}' if unit else ''}")
     return value
-
-
-def _length_word(text: str, where: str) -> float:
-    """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
-    unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
-    value = number_word(text.removesuffix(unit), where, "m, or a length as 20um or 0.02mm")
-    return value * _LENGTHS.get(unit, 1.0)
 
 
 def split_word(text: str) -> tuple[str, str]:

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, Ints, Terse
+from seqopt.arrays import Floats, Terse
 from seqopt.contact.mortar import EPOXY, _mortar_name, _with_mortar, find_elastic_limits
 from seqopt.engines.interface import (
     Engine,
@@ -181,7 +181,8 @@ def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fiel
     if not step.bricks:  # where a take-down ends
         return no_sets(engine.network, 0, 0, sets=1)
     with step_named(step):
-        return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
+        held = engine.network.scene.grip_numbers(step.grips, step.bricks)
+        return engine.solve(step.bricks, np.array(held, dtype=np.int64).reshape(1, -1), want)
 
 
 def _each_fields(
@@ -216,11 +217,6 @@ def _solved_alike(
     for (bricks, count), alike in sorted(same.items(), key=lambda item: (item[0][0], -item[0][1])):
         sets = np.array([held for _, held in alike], dtype=np.int64).reshape(len(alike), count)
         yield [*alike], engine.solve(bricks, sets, want)
-
-
-def _grips_of(scene: Scene, step: Step) -> Ints:
-    """Return the grips of a step as engines take them: one set, (1, r)."""
-    return np.array([scene.grip_numbers(step.grips, step.bricks)], dtype=np.int64).reshape(1, -1)
 
 
 def _node(cell: object) -> int | None:

@@ -109,11 +109,6 @@ class Standing:
         }
 
 
-def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
-    out = dict.fromkeys(demands)
-    return tuple(one for one in out if not any(o._implies(one) for o in out if o != one))
-
-
 class StandingSets:
     """Cached verdicts and margins of the grip sets of a scene.
 
@@ -135,7 +130,9 @@ class StandingSets:
                 "a robot without a largest force holds up anything, and says nothing of what "
                 "stands; give it a payload, or a limit on its force, and keep payloads"
             )
-        self._demands = demands = _without_implied(demands or (standing,))
+        every = dict.fromkeys(demands or (standing,))
+        implied = {one for one in every for other in every if other != one and other._implies(one)}
+        self._demands = demands = tuple(one for one in every if one not in implied)
         self._network, self._mortar = network, standing.mortar
         self._proofs, self._others = SCREENS.Proofs(), list[StandingSets]()
         self._screens = self._screened()
