@@ -168,17 +168,6 @@ def test_the_least_of_any_choice_is_that_of_enumeration(problem):
             assert proven(problem, aim) == problem.best(aim)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_the_least_is_found_among_costs_of_any_size(seed):
-    rng = np.random.default_rng(seed)
-    sizes = rng.integers(1, 5, size=4)
-    single = tuple(rng.exponential(size=size) for size in sizes)
-    shared = tuple(rng.exponential(size=pair) for pair in zip((1, *sizes[:-1]), sizes, strict=True))
-    costs = Costs(LayeredCosts(single, shared))
-    for aim in Aim:
-        assert proven(costs, aim) == pytest.approx(costs.best(aim), rel=1e-12, abs=1e-12)
-
-
 def signed(*bounds):
     """Four choices: (0, 0) is worth 5, (0, 1) 1, (1, 0) 10 and (1, 1) 6. All take 1."""
     single, none = (np.array([0.0, 5.0]), np.array([5.0, 1.0])), (np.zeros((1, 2)), np.eye(2) * 0)

@@ -76,6 +76,7 @@ def test_without_a_twin_a_plan_is_claimed():
     plan = seqopt.solve(posed((own,)))
     assert str(plan.status) == "claimed optimal"
     assert plan.certificate.bounds == (-np.inf,)
+    assert plan.summary()["bound_rests_on"] == {"busy": "claimed"}
     proven = seqopt.solve(posed((replace(own, twin=busy),)))
     assert (str(proven.status), proven.objective) == ("optimal", plan.objective)
 
