@@ -88,17 +88,15 @@ def test_transformations_are_composed_from_the_model_down(drawn):
         np.testing.assert_allclose(block.vertices, local @ at[:3, :3].T + at[:3, 3], atol=1e-12)
 
 
-def turned(**more):
+def turned():
     document = model()
-    document["data"] |= {"transformation": LYING, **more}
+    document["data"] |= {"transformation": LYING}
     return document
 
 
-def test_faces_follow_blocks_that_compas_moved(tmp_path):
+def test_faces_follow_blocks_that_compas_moved(read):
     """COMPAS moves the blocks of a model, and leaves the contacts where it found them."""
-    path = tmp_path / "lying.json"
-    path.write_text(json.dumps(turned()), encoding="utf-8")
-    lying = import_scene(path, given=Given(unit="m"))
+    lying = read("lying.json", turned(), Given(unit="m"))
     assert [round(brick.position[1], 9) for brick in lying.placed] == [-0.75, -1.25]
     assert [round(spring.position[1], 9) for spring in (*lying.grounds, *lying.joints)] == [
         -0.5,
@@ -503,13 +501,11 @@ def test_blocks_that_share_a_vertex_alone_are_two():
     assert len(keys(text)) == 2
 
 
-def test_what_is_open_is_said_to_be_open(tmp_path):
+def test_what_is_open_is_said_to_be_open(read):
     """Also where every face has vertices of its own, so that none says what belongs together."""
-    path = tmp_path / "open.obj"
-    path.write_text(loose().rsplit("f ", 1)[0], encoding="utf-8")
     last = len(SHAPES) - 1
     with pytest.raises(SceneError, match=f"block {last}: shape: edge .* close the shape"):
-        import_scene(path, given=Given(unit="m", density=2000.0))
+        read("open.obj", loose().rsplit("f ", 1)[0])
 
 
 def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
@@ -531,36 +527,25 @@ def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
     assert load_scene(out).grounds == scene.grounds
 
 
-GIVEN = Given(unit="m", density=2000.0)
 TOWER = [box((0.4, 0.2, 0.1), at=(0.0, 0.0, 0.1 * i)) for i in range(3)]
 
 
-@pytest.fixture
-def imported(tmp_path):
-    def of(text):
-        path = tmp_path / "tower.obj"
-        path.write_text(text, encoding="utf-8")
-        return import_scene(path, given=GIVEN)
-
-    return of
-
-
-def test_faces_without_area_are_no_blocks(imported):
+def test_faces_without_area_are_no_blocks(read):
     """As programs write them that cut every face into triangles."""
-    assert len(imported(obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
+    assert len(read("tower.obj", obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
 
 
-def test_faces_inside_a_block_are_named(imported):
+def test_faces_inside_a_block_are_named(read):
     """A wall across an L, between edges of which each has two faces without it."""
     shape, corners = prism(L_SHAPE, 0.1, at=(0.0, 0.0, 0.1)), len(L_SHAPE)
     wall = f"f 1 4 {4 + corners} {1 + corners}\n"
     with pytest.raises(SceneError, match=r"block 0: .* 2 of its edges have more than two faces"):
-        imported(obj(shape).replace("o block_0\n", "").replace("f ", f"{wall}f ", 1))
+        read("tower.obj", obj(shape).replace("o block_0\n", "").replace("f ", f"{wall}f ", 1))
 
 
-def test_an_object_of_several_blocks_is_said(imported):
+def test_an_object_of_several_blocks_is_said(read):
     cubes = [box((0.2, 0.2, 0.1), at=(x, 0, 0)) for x in (0.0, 0.3)]
-    said = imported(obj(*cubes).replace("o block_1\n", "")).provenance
+    said = read("tower.obj", obj(*cubes).replace("o block_1\n", "")).provenance
     assert "2 closed pieces are called block_0: each is a block of its own" in said
 
 
