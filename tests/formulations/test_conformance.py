@@ -32,7 +32,7 @@ from seqopt.graph.formulation import (
 from seqopt.graph.graph import Graph
 from seqopt.problem.problem import Aim
 from seqopt.study import CRITERIA, EQUATIONS
-from tests.builders import small_arch
+from tests.builders import Clock, small_arch
 from tests.layered import Budget, Costs, answer, of_layers
 from tests.strategies import budgeted, problems
 
@@ -54,17 +54,6 @@ OURS = {  # others, as those of the pages, promise no gap
 }
 timely = pytest.mark.parametrize("name", [n for n in [*SHOWN, *exhibits()] if ALL[n].watched])
 takers = pytest.mark.parametrize("name", [n for n, f in ALL.items() if f.takes_budgets])
-
-
-class Clock:
-    """A clock that moves on by a second whenever it is looked at."""
-
-    def __init__(self):
-        self.now = 0.0
-
-    def perf_counter(self):
-        self.now += 1.0
-        return self.now
 
 
 @every_aim
@@ -164,7 +153,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     aim, told = formulation.aim, []
     best = problem.best(aim)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("seqopt.graph.formulation.time", Clock())
+        patch.setattr("seqopt.graph.formulation.time", Clock(1.0))
         found, wrongly_refused = None, False
         try:
             found = answer(problem, name, time_limit=float(limit), progress=told.append)
