@@ -77,16 +77,6 @@ def test_answers_are_certified_or_refused_as_infeasible(name, aim, problem):
     assert found.bound <= best + 1e-6
 
 
-@given(problem=problems())
-def test_wide_searches_are_exact(problem):
-    best = problem.best()
-    if not np.isfinite(best):
-        return
-    moves = len(problem.sums.sizes)
-    for name, options in (("beam", {"width": 4}), ("rank_search", {"horizon": moves})):
-        assert answer(problem, name, **options).objective == pytest.approx(best)
-
-
 SETTINGS = [
     *(("cascade", {"charge": charge}) for charge in ("later", "earlier")),
     *(("beam", {"width": width}) for width in (1, 2, 3)),
