@@ -329,16 +329,6 @@ def test_the_choice_and_its_bound_are_the_least(name, lowest):
     assert all(one.bound <= least + 1e-12 * abs(least) for one in told)
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(name):
-    costs, aim = Costs(costs_of(0.0)), PROGRAMS[name].aim
-    found = answer(costs, name, time_limit=0.0)
-    assert found.stopped == "time"
-    assert found.bound <= costs.best(aim) + 1e-9
-    assert costs.best(aim) <= found.objective + 1e-9
-    assert costs.worth(found.choice, aim) == pytest.approx(found.objective, rel=1e-12)
-
-
 def test_an_assignment_needs_a_state_of_every_level():
     source, target = np.array([0, 0, 1]), np.array([1, 2, 2])
     ends = np.array([False, False, True])
