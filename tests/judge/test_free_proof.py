@@ -93,10 +93,8 @@ def test_bounds_are_the_values_of_the_best_plan(aim, build, told):
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_the_models_of_a_proof_are_those_that_engines_solved(count):
-    engines = [
-        seqopt.make_engine("auto", seqopt.build_network(first(seqopt.load_scene("arch25"), 9)))
-    ]
-    engines += [seqopt.make_engine("auto", engines[0].network) for _ in range(1, count)]
+    network = seqopt.build_network(first(seqopt.load_scene("arch25"), 9))
+    engines = [seqopt.make_engine("auto", network) for _ in range(count)]
     problem = build_states(engines[0], seqopt.FreeRules(), ONES, "minmax")
     problem = replace(problem, scenarios=tuple(engines) if count > 1 else ())
     value = seqopt.solve(problem).objective["minmax"]

@@ -13,8 +13,8 @@ from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.scene.parts import Robot
-from seqopt.stability._screens import STANDS, HeldStates, Margins, Screen, _decided, _narrow
-from seqopt.stability.assessment import assess, bonded
+from seqopt.stability._screens import STANDS, Margins, Screen, _decided
+from seqopt.stability.assessment import assess
 from seqopt.stability.limit_analysis import EXACT
 from seqopt.stability.verdict import Verdict
 from tests.builders import block, held, lacking
@@ -78,11 +78,6 @@ def test_the_overhanging_block_needs_a_bond_and_goes_first():
     assert assess(leaning, strong).verdict is Verdict.STANDS
     weak = replace(DRY, tensile_strength=0.99 * result.bond, cohesion=2 * result.bond)
     assert assess(leaning, weak).verdict is Verdict.FALLS
-    states = HeldStates(leaning, bonded(leaning, Mortar(friction=DRY.friction)), compile_held)
-    low, high = states.bracket(*NOBODY, _narrow)[0] * leaning.stress_scale
-    exact = weight * excess / (face * face / 2)
-    assert low * (1 - 1e-9) <= exact <= high * (1 + 1e-9)
-    assert high - low < 2e-3 * exact
 
 
 @pytest.mark.parametrize(("half_span", "height"), [(1.0, 1.0), (1.0, 2.5), (2.0, 1.5)])
