@@ -142,7 +142,7 @@ def _row(
     try:
         found = plan(load_scene(scene) if isinstance(scene, str | Path) else scene)
     except SeqoptError as error:
-        status = next((said for kind, said in WHY.items() if isinstance(error, kind)), "refused")
+        status = next((text for kind, text in WHY.items() if isinstance(error, kind)), "refused")
         row: dict[str, Any] = {"status": status, "why": str(error)}
     else:
         falls = {name: found.verdicts(name) for name in mortars}

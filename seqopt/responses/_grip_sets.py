@@ -128,7 +128,7 @@ class Block(FrozenValue):
     def with_errors(self, rows: Floats, fields: Fields) -> Floats:
         """Return rows (S, R + r), and beside them what six digits may be off, as many columns.
 
-        Fields err by a share of the largest entry of each, whatever else they hold.
+        Fields err by a share of the largest entry of each.
         """
         largest = dict[Want, Floats]()
         for name, flag in FLAGS.items():

@@ -114,7 +114,7 @@ class _Processes(ProcessPoolExecutor):
 
     def __init__(self, workers: int) -> None:
         context = multiprocessing.get_context("spawn")  # threads and fork do not go together
-        end, self.leash = context.Pipe(duplex=False)
+        end, self.pipe = context.Pipe(duplex=False)
         super().__init__(workers, context, _follow, (end,))
 
     def submit(self, function: Callable[..., Any], /, *tasks: object, **named: Any) -> Future[Any]:
@@ -136,14 +136,14 @@ class _Processes(ProcessPoolExecutor):
         started: dict[int, Any] = getattr(self, "_processes", None) or {}
         if all(process.is_alive() for process in [*started.values()]):
             return
-        self.leash.close()
+        self.pipe.close()
         results = getattr(self, "_result_queue", None)  # there is no public way to it
         if writer := getattr(results, "_writer", None):
             writer.close()
 
 
 def _follow(end: Connection) -> None:
-    """Let a process of ours live no longer than its leash, and leave interrupts to its master."""
+    """Let a process of ours live no longer than its parent, and leave interrupts to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # errors are sent
     warnings.simplefilter("ignore", RuntimeWarning)
@@ -203,11 +203,11 @@ def worker_pool(executor: Executor | None = None, workers: int = 1) -> Iterator[
     try:
         yield WorkerPool(processes, workers)
     except BaseException:
-        processes.leash.close()  # at once; else when all that is under way is done
+        processes.pipe.close()  # at once; else when all that is under way is done
         raise
     finally:
         processes.shutdown(wait=True, cancel_futures=True)
-        processes.leash.close()
+        processes.pipe.close()
 
 
 @contextmanager
@@ -358,8 +358,8 @@ class Stage:
     left: float | None = None
 
     def __str__(self) -> str:
-        said = f"{self.what}: {100 * self.share:.0f} %"
-        return said if self.left is None else f"{said}, {duration(self.left)} left"
+        text = f"{self.what}: {100 * self.share:.0f} %"
+        return text if self.left is None else f"{text}, {duration(self.left)} left"
 
 
 class Progress:
@@ -427,7 +427,7 @@ _ENDS = tuple(
 
 
 @contextmanager
-def _answered(told: Callable[[], object]) -> Iterator[None]:
+def _answered(call: Callable[[], object]) -> Iterator[None]:
     """Answer the first termination signal by a call; a second one is handled as before.
 
     Signals with foreign handlers are left to these. The call runs between two instructions of the
@@ -442,7 +442,7 @@ def _answered(told: Callable[[], object]) -> Iterator[None]:
 
     def note(_: int, __: FrameType | None) -> None:
         give_back()
-        told()
+        call()
 
     try:
         for number in numbers:
