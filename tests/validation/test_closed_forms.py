@@ -12,7 +12,6 @@ from seqopt.engines.interface import RIGID, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
 from seqopt.network.network import build_network
-from seqopt.responses.table import _grips_of
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.methods import METHODS
 from seqopt.study import STUDY_BED
@@ -110,7 +109,8 @@ def largest(network, method):
     """The largest force of a grip and displacement of a brick's node over the steps of a method."""
     engine, most = ComplianceEngine(network), np.zeros(2)
     for step in METHODS[method](network):
-        found = engine.solve(step.bricks, _grips_of(network.scene, step), Want.DISPLACEMENTS)
+        held = network.scene.grip_numbers(step.grips, step.bricks)
+        found = engine.solve(step.bricks, [held], Want.DISPLACEMENTS)
         moved = found.displacement[0, network.inner[: step.bricks].ravel()]
         force = np.linalg.norm(found.grip_force[0], axis=1).max(initial=0.0)
         most = np.maximum(most, [force, 1e6 * np.linalg.norm(moved, axis=1).max()])
