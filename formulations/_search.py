@@ -211,11 +211,11 @@ def selected(space: Space, visited: Visited, best: Best | Within) -> Solution:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a search; ``dear``: filters are expensive, so first plans keep to lower bounds."""
+    """Options of a search; ``expensive``: filters are, so first plans keep to lower bounds."""
 
     width: int
     growth: float
-    dear: bool
+    expensive: bool
 
 
 class ThresholdSearch:
@@ -382,7 +382,7 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
         sets = comb(2 * len(problem.network.inner), problem.space.robots)
         many = sets * problem.space.levels > MANY
         for wider in (1, WIDER):
-            if wider > 1 and not many and (search.incumbent or options.dear):
+            if wider > 1 and not many and (search.incumbent or options.expensive):
                 break  # it pays where the first one found nothing
             if wider > 1 and search.incumbent and search.misses_floor(problem):
                 break
@@ -404,7 +404,7 @@ def _first(
 ) -> Solution | None:
     """Return a first plan; where that is expensive, only if it attains the lower bounds."""
     width, enough = wider * options.width, floors[0] if wider > 1 else -np.inf
-    most = floors if options.dear else None
+    most = floors if options.expensive else None
     if most and problem.each and not problem.demands:
         found = _in_all(problem, narrow(problem.each[0], width, tell, most, enough), floors)
         if found:

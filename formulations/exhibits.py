@@ -191,8 +191,8 @@ def _exhibit(
 
     def choose(graph: Graph, watch: Watch) -> Choice:
         if graph.peaks != (aim is Aim.PEAK,):
-            said = "largest cost" if aim is Aim.PEAK else "sum of costs"
-            raise ProblemError(f"{name}: it writes one {said} down alone; take overlap_mip")
+            text = "largest cost" if aim is Aim.PEAK else "sum of costs"
+            raise ProblemError(f"{name}: it writes one {text} down alone; take overlap_mip")
         return by_integers(write)(graph, watch)
 
     def search(problem: States, watch: Watch, tell: Watching) -> Solution:

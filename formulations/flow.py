@@ -273,7 +273,7 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
                 written.program,
                 feasible=bool(goal) or not graph.caps,
                 watch=watch.apart() if goal else watch,
-                told=written.bound,
+                convert=written.bound,
                 tolerance=EXACTLY,
             )
             bound = written.bound(found.bound if found.stopped else found.value)

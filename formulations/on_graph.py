@@ -330,13 +330,13 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     states = tuple((node,) for node in found.path)
     early = ("interrupt" if watch.interrupted else "time") * found.stopped
     watch.tell(values[0], min(values[0], bounds[0]))  # the trace ends with what is claimed
-    told = (found.prices, early)
     return Solution(
         states,
         values,
         tuple(map(_without_rounding, values, bounds)),
         (),
-        *told,
+        found.prices,
+        early,
         trace=watch.trace,
         compile_seconds=found.compile_seconds,
     )

@@ -45,7 +45,7 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.states import States
 from seqopt.scene.scene import Order
 
-HOW = Options(width=50, growth=1.1, dear=False)
+HOW = Options(width=50, growth=1.1, expensive=False)
 
 
 def choose(graph: Graph, watch: Watch, *, most: int = 5000) -> Choice:  # noqa: ARG001  # of orders

@@ -71,8 +71,8 @@ def _of_states(
     _require_options(width, growth)
     if problem.totals:
         return best_total(problem, shortest, watch, tell)
-    dear = bool(problem.demands or problem.each) and not watch.is_limited
-    options = Options(width, growth, dear)
+    expensive = bool(problem.demands or problem.each) and not watch.is_limited
+    options = Options(width, growth, expensive)
     return after_margins(problem, lambda rest: search_states(rest, options, tell), tell)
 
 

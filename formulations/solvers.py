@@ -40,13 +40,13 @@ def minimize_by_highs(
     *,
     feasible: bool,
     watch: Watch | None = None,
-    told: Callable[[float], float] = float,
+    convert: Callable[[float], float] = float,
     tolerance: float | None = None,
 ) -> Optimum:
     """Solve a linear or an integer program by HiGHS; its variables take the best values.
 
     ``feasible``: whether it is known to have a solution; ``watch``: deadline, which records
-    incumbents and bounds of integer programs, converted to its unit by ``told``; ``tolerance``: of
+    incumbents and bounds of integer programs, in its unit by ``convert``; ``tolerance``: of
     constraints, by default that of HiGHS. Raises `InfeasibleError` if the solver proves that
     nothing is within all budgets; `SolverError` if it ends otherwise than with an optimum or at its
     limit, or calls a program infeasible that is not.
@@ -59,7 +59,7 @@ def minimize_by_highs(
         solver = _loaded(data, whole=whole)
         seconds = time.perf_counter() - start
         offset = float(inverse[-1].get("offset", 0.0))
-        _listen(solver, watch, lambda value: told(value + offset))
+        _listen(solver, watch, lambda value: convert(value + offset))
         if tolerance is not None:
             for name in ("primal", "dual", "mip"):
                 solver.setOptionValue(f"{name}_feasibility_tolerance", tolerance)
@@ -114,7 +114,7 @@ def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:
     return solver
 
 
-def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float]) -> None:
+def _listen(solver: highspy.Highs, watch: Watch, convert: Callable[[float], float]) -> None:
     """Let HiGHS report every incumbent to a watch, and its bounds between them.
 
     It ends when the watch says so, also while it solves linear programs.
@@ -122,8 +122,8 @@ def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float])
 
     def hear(event: Any) -> None:
         data = event.data_out
-        value = told(data.mip_primal_bound)
-        watch.tell(value if math.isfinite(value) else math.inf, told(data.mip_dual_bound))
+        value = convert(data.mip_primal_bound)
+        watch.tell(value if math.isfinite(value) else math.inf, convert(data.mip_dual_bound))
         end(event)
 
     def end(event: Any) -> None:

@@ -32,7 +32,7 @@ _find, _ = later("seqopt", _HOME_OF)
 
 
 def __getattr__(name: str) -> object:
-    """Load a name of the door when it is first used (PEP 562)."""
+    """Load a public name when it is first used (PEP 562)."""
     if name == "__version__":
         from importlib.metadata import version  # noqa: PLC0415  # 30 ms that few ask for
 

@@ -129,7 +129,9 @@ def required(name: str) -> Any:
     """Return the offer of an outer room by name. Raises `ExtraError` if the room is missing."""
     if (found := offered(name)) is None:
         home = ".".join(OFFERS[name].split(".")[:2])
-        raise ExtraError(f"{name} is of the room {home}, which is not there: install seqopt anew")
+        raise ExtraError(
+            f"{name} is of the subpackage {home}, which is not there: install seqopt anew"
+        )
     return found
 
 
@@ -164,7 +166,7 @@ def registered(kind: type[_Kind]) -> dict[str, _Kind]:
         try:
             every.append((name, entry.load()))
         except Exception as error:  # it is code of others
-            said = f"plug-in {entry.value}: {message_of(error)}; it is left out"
-            warnings.warn(said, PluginWarning, stacklevel=2)
+            text = f"plug-in {entry.value}: {message_of(error)}; it is left out"
+            warnings.warn(text, PluginWarning, stacklevel=2)
     every += [(name, part) for (_, name), part in ADDED.items()]
     return {name: part for name, part in every if isinstance(part, kind)}

@@ -79,9 +79,9 @@ def find_steps(
     steps = plan_folder(scene) if steps is None else steps
     named = isinstance(steps, str) and steps in (*METHODS, PUBLISHED)
     if robots and not (steps is None or (named and steps != PUBLISHED)):
-        said = robots if isinstance(robots, int) else ",".join(robots)
+        text = robots if isinstance(robots, int) else ",".join(robots)
         raise StepError(
-            f"robots {said}: a plan says itself who holds; leave it out, or give "
+            f"robots {text}: a plan says itself who holds; leave it out, or give "
             f"{' or '.join(f'method={name!r}' for name in METHODS)}"
         )
     scene = find_scene(scene, robots=robots)
@@ -99,8 +99,8 @@ def find_steps(
     if steps != PUBLISHED:
         return Given(network, str(steps), METHODS[str(steps)](network, names))
     if not is_reference_arch(scene):
-        said = f"method {PUBLISHED} is the printed plan for arch25; give a plan for another scene"
-        raise SceneError(f"scene {scene.name}: {said}")
+        text = f"method {PUBLISHED} is the printed plan for arch25; give a plan for another scene"
+        raise SceneError(f"scene {scene.name}: {text}")
     return Given(network, PUBLISHED, published_plan(scene))
 
 
@@ -364,8 +364,8 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     >>> replan(plan, 4, payload=["rob1=250"]).changes["differs"] is None
     True
     """
-    asked, (scene, steps, told) = locals(), _planned(build, lost=bool(lost))
-    if told["direction"] and missing:
+    asked, (scene, steps, words) = locals(), _planned(build, lost=bool(lost))
+    if words["direction"] and missing:
         raise StepError("missing: bricks are missing in a build; a take-down removes them anyway")
     site, done = Site.after(steps, at), tuple(step for step in steps if step.number <= at)
     built = scene
@@ -373,19 +373,19 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
         built = required("as_measured")(scene, Path(measured), site.bricks)
     built = find_scene(built, payload=payload, grips=grips, durations=durations, robots=robots)
     begin = _Place(site, done) if isinstance(build, Plan) else f"{build}:{at}"
-    changed = {"to": to, "lost": lost, "missing": missing, "direction": told.pop("direction")}
+    changed = {"to": to, "lost": lost, "missing": missing, "direction": words.pop("direction")}
     part, own = Part(schedule=FREE, begin=begin, **changed), ("formulation", "engine", "stands")
-    every = {name: asked[name] or each for name, each in told.items()}
+    every = {name: asked[name] or each for name, each in words.items()}
     every |= {name: asked[name] for name in (*own, "mortar", "search", "progress")}
-    every["rules"] = (*told["rules"], *((rules,) if isinstance(rules, str) else rules))
+    every["rules"] = (*words["rules"], *((rules,) if isinstance(rules, str) else rules))
     try:
         new = optimize(built, part, robots=robots, **every)
     except InfeasibleError as error:
-        said, count = "", len(built.robots) + 1
+        text, count = "", len(built.robots) + 1
         with suppress(InfeasibleError, NothingFoundError, StepError):
             found = optimize(with_robots(built, count), part, robots=count, **every)
-            said = f"; or with one more robot that reaches every node: {found.result}"
-        raise InfeasibleError(f"{error}{said}") from None
+            text = f"; or with one more robot that reaches every node: {found.result}"
+        raise InfeasibleError(f"{error}{text}") from None
     rest = [step for step in steps if step.number > at]
     changes = REPLAN.compared(new, rest, next(_gone(scene, new, rest, lost), ""))
     if measured is not None:
@@ -421,6 +421,6 @@ def _planned(
         steps = required("read_plan")(scene, folder)
         with suppress(FileError):
             summary = parse_json(read_text(folder / "summary.json"), "summary")
-    told: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)
-    told["criterion"] = told["criterion"] if told["criterion"] in CRITERIA else None
-    return scene, steps, told
+    words: dict[str, Any] = REPLAN.asked_before(summary, lost=lost)
+    words["criterion"] = words["criterion"] if words["criterion"] in CRITERIA else None
+    return scene, steps, words

@@ -114,8 +114,8 @@ class Search:
                 try:
                     out[name] = kind(value)
                 except ValueError:
-                    said = f"{name} is {value!r}; give an {kind.__name__}"
-                    raise ProblemError(f"{where}: {said}") from None
+                    text = f"{name} is {value!r}; give an {kind.__name__}"
+                    raise ProblemError(f"{where}: {text}") from None
         if self.max_memory is not None and "max_memory" in known:
             out["max_memory"] = self.memory
         return out

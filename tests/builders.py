@@ -160,6 +160,17 @@ def anywhere(count):
     return tuple(Robot(name=f"rob{i + 1}", payload=400.0) for i in range(count))
 
 
+class Clock:
+    """A clock that moves on by some seconds whenever it is looked at."""
+
+    def __init__(self, step):
+        self.step, self.now = step, 0.0
+
+    def perf_counter(self):
+        self.now += self.step
+        return self.now
+
+
 def with_part(scene, kind, index, **change):
     """The scene with one brick, joint or ground end changed."""
     parts = list(getattr(scene, kind))

@@ -62,4 +62,4 @@ def test_arms_without_their_room_are_refused_in_a_line(house):
     robots = [seqopt.Robot(name=r.name, payload=r.payload, arm=arm) for r in scene.robots]
     seqopt.save_scene(scene.with_robots(*robots), house / "s.json")
     (line,) = run(house, ARMED).splitlines()
-    assert line.startswith("ExtraError Arm is of the room seqopt.arms, which is not there")
+    assert line.startswith("ExtraError Arm is of the subpackage seqopt.arms, which is not there")

@@ -87,8 +87,8 @@ def answer_of(result: Any) -> Answer:
     if isinstance(result, str | None):
         return Answer({"text": result or ""}, text=result or "")
     if not isinstance(result, Answer):
-        said = f"it returns {type(result).__name__}; return a text or a table"
-        raise ProblemError(f"the command cannot be answered: {said}")
+        text = f"it returns {type(result).__name__}; return a text or a table"
+        raise ProblemError(f"the command cannot be answered: {text}")
     return result
 
 

@@ -54,8 +54,8 @@ def bonded(engine: Engine, mortar: str | None) -> Iterator[str]:
     held = EPOXY if chooser is None else chooser.mortar
     asked = held if mortar is None else find_mortar(mortar)
     if asked != held and not isinstance(engine, OpeningEngine):
-        said = f"bonded {_with_mortar(_mortar_name(held))} in this engine"
-        yield f"joints: {said}; of steps {_with_mortar(_mortar_name(asked))} verdicts alone speak"
+        text = f"bonded {_with_mortar(_mortar_name(held))} in this engine"
+        yield f"joints: {text}; of steps {_with_mortar(_mortar_name(asked))} verdicts alone speak"
 
 
 def marked(
@@ -84,5 +84,5 @@ def marked(
     answer = replace(answer, facts=facts, text=text, notes=notes if text else (*lines, *notes))
     if not beyond or answer.status is not Status.DONE:
         return answer
-    said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+    line = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(*answer.failures, line), status=Status.DOES_NOT_HOLD)

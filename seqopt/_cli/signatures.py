@@ -203,10 +203,10 @@ class Signature:
         for title in sorted(groups, key=[OWN, *QUESTIONS].index):
             group = command.add_argument_group(title)
             for option in groups[title]:
-                value, said = texts.get(option.name, ("", PRINTED.get(option.name, "")))
+                value, text = texts.get(option.name, ("", PRINTED.get(option.name, "")))
                 upper = value if value == value.upper() else ""  # of packages of others
                 known = replace(option, more={"value": upper, **option.more}) if upper else option
-                known.add_to(group, self._help(option, said))
+                known.add_to(group, self._help(option, text))
 
     def _spoken(self, text: str) -> str:
         """Return a text of a docstring as the command line says it: parameters are options."""

@@ -28,7 +28,7 @@ class Watcher:
 
     def __init__(self, *, shows: bool = True) -> None:
         self._shows = shows and (is_terminal(sys.stderr) or hasattr(sys.stderr, "pub_thread"))
-        self._start = self._told = time.perf_counter()
+        self._start = self._reported = time.perf_counter()
         self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
         self._stage = Stage("working", -1.0)  # no share is below zero
         self._over = threading.Event()
@@ -45,25 +45,25 @@ class Watcher:
         if self._shows:
             self._ticking.join(CLEARED)
 
-    def __call__(self, told: object) -> None:
+    def __call__(self, stage: object) -> None:
         """Record the current stage with its share, or in words."""
-        new = told if isinstance(told, Stage) else Stage(str(told), -1.0)
-        self._told = time.perf_counter()
-        began, share = self._began.get(new.what, (self._told, 0.0))
+        new = stage if isinstance(stage, Stage) else Stage(str(stage), -1.0)
+        self._reported = time.perf_counter()
+        began, share = self._began.get(new.what, (self._reported, 0.0))
         if new.share >= 0:  # it begins anew where it falls
-            self._began[new.what] = began if new.share >= share else self._told, new.share
+            self._began[new.what] = began if new.share >= share else self._reported, new.share
         self._stage = new
 
     def line(self) -> str:
         """Return the line that says how far the command is."""
-        now, stage, told = time.perf_counter(), self._stage, self._told
+        now, stage, then = time.perf_counter(), self._stage, self._reported
         what, left = f"{harmless(stage.what)[: columns() - TAIL]} …", stage.left
         if left is None and stage.share > 0:
-            left = (told - self._began[stage.what][0]) * (1 / stage.share - 1)
-        if stage.share <= 0 or left is None or left <= now - told:
+            left = (then - self._began[stage.what][0]) * (1 / stage.share - 1)
+        if stage.share <= 0 or left is None or left <= now - then:
             return f"{what} {duration(now - self._start)} so far"
         share = 100 * min(stage.share, 1.0)
-        return f"{what} {share:.0f} %, {duration(max(left - (now - told), 1.0))} left"
+        return f"{what} {share:.0f} %, {duration(max(left - (now - then), 1.0))} left"
 
     def _tick(self) -> None:
         """Show the line now and then, and clear it in the end."""

@@ -114,8 +114,8 @@ def given_steps(
         A plan's folder, or a CSV file of steps: step, type, bricks, NAME_node of each robot.
     """
     if method is not None and plan is not None:
-        said = "not allowed with --plan; leave one of them out"
-        raise ProblemError(f"--method {method}: {said}")
+        text = "not allowed with --plan; leave one of them out"
+        raise ProblemError(f"--method {method}: {text}")
     return plan or method
 
 

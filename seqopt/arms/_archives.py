@@ -99,10 +99,10 @@ class Archive:
         wanted = zip(found.shape, shape, strict=False)
         fits = found.ndim == len(shape) and all(want in (None, has) for has, want in wanted)
         if not fits or found.dtype.kind not in kinds:
-            said = " x ".join("any" if each is None else str(each) for each in shape) or "one"
+            text = " x ".join("any" if each is None else str(each) for each in shape) or "one"
             raise FileError(
                 f"{self._where}: {name} has shape {found.shape} of {found.dtype}; "
-                f"{said} of kind {' or '.join(kinds)} belongs there"
+                f"{text} of kind {' or '.join(kinds)} belongs there"
             )
         return found
 
@@ -118,6 +118,6 @@ class Archive:
         """Return an array of finite numbers, none below a bound; else as `array`."""
         found = self.array(name, "iuf", shape).astype(float)
         if not (np.isfinite(found) & (found >= least)).all():
-            said = "" if np.isinf(least) else f" from {least:g}"
-            raise FileError(f"{self._where}: {name}: give finite numbers{said}")
+            text = "" if np.isinf(least) else f" from {least:g}"
+            raise FileError(f"{self._where}: {name}: give finite numbers{text}")
         return found

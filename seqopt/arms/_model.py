@@ -44,12 +44,12 @@ class Urdf:
     bare: tuple[str, ...]
 
     def __str__(self) -> str:
-        said = []
+        lines = []
         if self.visual:
-            said.append(f"no <collision> of {', '.join(self.visual)}: <visual> is checked instead")
+            lines.append(f"no <collision> of {', '.join(self.visual)}: <visual> is checked instead")
         if self.bare:
-            said.append(f"no shape at all of {', '.join(self.bare)}: nothing says what it hits")
-        return "; ".join(said)
+            lines.append(f"no shape at all of {', '.join(self.bare)}: nothing says what it hits")
+        return "; ".join(lines)
 
 
 def model_path(arm: Arm) -> Path:
@@ -113,7 +113,7 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
         if robot.arm is not None:
             with suppress(SceneError, FileError):
                 found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
-    return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
+    return tuple(f"robot {name}: its arm has {text}" for name, text in found if text)
 
 
 def _followed(robot: _Link) -> list[str]:

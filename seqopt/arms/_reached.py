@@ -262,8 +262,8 @@ def reached_alone(site: Site, most: int) -> Reached:
     at = np.arange(len(rows))
     struck[at, -1, held] = False
     moving = model.names[len(model.fixed) :]
-    said = [name.replace(SAYS, "hits the brick that it grips") for name in moving]
-    _blame(faults, struck[at, :, held], said, 3, rows)
+    lines = [name.replace(SAYS, "hits the brick that it grips") for name in moving]
+    _blame(faults, struck[at, :, held], lines, 3, rows)
     some = np.flatnonzero([faults[row] is None for row in rows])
     hit = np.asarray(struck.any(axis=1))
     counts = np.bincount(places[rows[some]], minlength=len(site.nodes))
@@ -312,9 +312,9 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
             one, two = (site.robots[k].name for k in (i, j))
             if overlap(bases[i], bases[j]).any():
                 raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
-            said = [name.replace(SAYS, f"hits the base of {two}") for name in names]
+            lines = [name.replace(SAYS, f"hits the base of {two}") for name in names]
             struck = np.asarray(hits(own.model, own.placed, bases[j]).any(axis=2))
-            _blame(faults, struck, said, 4)
+            _blame(faults, struck, lines, 4)
         rows = np.flatnonzero([fault is None for fault in faults])
         parts = {name: getattr(own, name)[rows] for name in _BY_POSTURE}
         why = own.why | _lacking(own.node, faults)

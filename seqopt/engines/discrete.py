@@ -392,8 +392,8 @@ class DiscreteEngine(OpeningEngine):
             return _fields(network, held, found, columns, springs)
         if held.gone(found):
             moved = (system.unit * held.moved(found.motion))[: 6 * bricks]
-            said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
-            raise mechanism_error(network, moved, said + "friction")
+            text = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
+            raise mechanism_error(network, moved, text + "friction")
         names = ", ".join(str(network.node_name[node]) for node in nodes) or "nothing"
         raise SolverError(
             f"{bricks} bricks held at {names}: the discrete elements neither came to rest nor "

@@ -267,20 +267,20 @@ def provenance(engine: Engine) -> dict[str, object]:
     many ``sets``, and why each.
     """
     recipe = recipe_of(engine)
-    said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
+    facts: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
     if recipe is not None:
         why = "the default" if recipe.engine == DEFAULT else "asked for by name"
-        said = {"name": recipe.engine, "reason": why}
-        said |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
+        facts = {"name": recipe.engine, "reason": why}
+        facts |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
     if _chooser_of(engine) is not None:
-        said["level"] = {"engine": USUAL, "reason": REASONS[USUAL]}
+        facts["level"] = {"engine": USUAL, "reason": REASONS[USUAL]}
     elif isinstance(engine, AutoEngine):
-        said["levels"] = [
+        facts["levels"] = [
             {"engine": level, "sets": sets, "reason": REASONS[level]}
             for level, sets in engine.tally.items()
         ]
-        said["unchecked"] = engine.unchecked or None
-    return {"engine": said, "versions": dict(versions())}
+        facts["unchecked"] = engine.unchecked or None
+    return {"engine": facts, "versions": dict(versions())}
 
 
 @cache
@@ -302,9 +302,9 @@ def level_notes(named: str | None, engine: Engine) -> tuple[str, ...]:
         return (f"engine: {USUAL}: {REASONS[USUAL]}",) if named else ()
     if not isinstance(engine, AutoEngine):
         return ()
-    said = [
+    lines = [
         f"engine: {level} for {sets} grip sets: {REASONS[level]}"
         for level, sets in engine.tally.items()
         if named or level == "discrete"
     ]
-    return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
+    return (*lines, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))

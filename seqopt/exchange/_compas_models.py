@@ -74,8 +74,8 @@ def read_assembly(document: Any, source: str) -> Content:
         course, support = node.get("course", node.get("order")), node.get("is_support") is True
         course = None if course is None else number(f"{where}: course", course)
         blocks.append(FileBlock(key, vertices, faces, support=support, course=course))
-    said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    return Content(tuple(blocks), said=tuple(said))
+    lines = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
+    return Content(tuple(blocks), said=tuple(lines))
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
@@ -94,9 +94,9 @@ def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | 
 def read_model(document: Any, source: str) -> Content:
     """Return the content of a block model, or of a problem about one."""
     held = held_by(source, document)
-    said = list[str]()
+    lines = list[str]()
     if kind(document) == "problem":
-        said.append("loads and joints of the problem are left out; blocks carry their weight")
+        lines.append("loads and joints of the problem are left out; blocks carry their weight")
         if "model" not in held:  # some versions keep its identifier alone
             raise SceneError(
                 f"{source}: the problem does not hold its model; give the model itself"
@@ -123,8 +123,8 @@ def read_model(document: Any, source: str) -> Content:
             points = vertices @ placed[guid][:3, :3].T + placed[guid][:3, 3]
             blocks.append(FileBlock(str(i), points, faces, **about))
     if len(blocks) < len(rows):
-        said.append(f"{len(rows) - len(blocks)} groups only place what is in them")
-    return Content(tuple(blocks), said=tuple(said))
+        lines.append(f"{len(rows) - len(blocks)} groups only place what is in them")
+    return Content(tuple(blocks), said=tuple(lines))
 
 
 _SOLIDS = ("mesh", "box", "polyhedron")
@@ -163,14 +163,14 @@ def read_meshes(document: Any, source: str) -> Content:
     """Return meshes as blocks, under their names, or their keys in a dictionary."""
     left = Counter[str]()
     solids = [*_listed(source, document, left)]
-    said = [f"{count} objects are left out: {what}" for what, count in left.items()]
+    lines = [f"{count} objects are left out: {what}" for what, count in left.items()]
     if left and not solids:
         raise SceneError(
-            f"{source}: {'; '.join(said)}. Lines, points and curves are no blocks: give meshes, "
+            f"{source}: {'; '.join(lines)}. Lines, points and curves are no blocks: give meshes, "
             "boxes or polyhedra"
         )
     found = object_content(solids, source)
-    return replace(found, said=("a list of meshes: no supports, faces or order", *said))
+    return replace(found, said=("a list of meshes: no supports, faces or order", *lines))
 
 
 def _listed(

@@ -38,13 +38,13 @@ def _find_odd_units(scene: Scene) -> Iterator[str]:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
     large = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
     odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
-    for found, said in (
+    for found, text in (
         (large, "dimensions of {0.dimensions} m look like millimeters; give meters"),
         (odd, "a density of {0.density:g} kg/m³ is odd; check its unit"),
     ):
         if found:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            yield f"brick {found[0].name}{more}: {said.format(found[0])}"
+            yield f"brick {found[0].name}{more}: {text.format(found[0])}"
     far = [r for r in scene.robots if isinstance(r.reach, Sphere) and r.reach.radius > _FAR_REACH]
     for robot in far[:1]:
         yield f"{robot.name}: a reach of {robot.reach.radius:g} m looks like millimeters"  # type: ignore[union-attr]

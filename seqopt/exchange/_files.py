@@ -142,8 +142,8 @@ def listed(rows: Sequence[Mapping[str, Any]], counts: Container[str] = ()) -> li
         return f"{value:.4g}" if isinstance(value, float) else str(value)
 
     columns = [[name, *(cell(name, row[name]) for row in rows)] for name in rows[0]]
-    told = [column for column in columns if any(column[1:])]
-    wide = [[text.rjust(max(map(len, column))) for text in column] for column in told]
+    filled = [column for column in columns if any(column[1:])]
+    wide = [[text.rjust(max(map(len, column))) for text in column] for column in filled]
     return ["  ".join(line) for line in zip(*wide, strict=True)]
 
 

@@ -170,7 +170,7 @@ def read_file(path: Path, form: str | None = None) -> Content:
     fitting = (each for each in (*known.values(), JSON) if each.read and suffix in each.endings)
     found = next(fitting, None) if form is None else known.get(form)
     if found is None or found.read is None:
-        remedies = (said for endings, said in _INSTEAD.items() if suffix in endings.split())
+        remedies = (text for endings, text in _INSTEAD.items() if suffix in endings.split())
         if form is None and (remedy := next(remedies, "")):
             as_obj = "closed meshes with a name each as .obj"
             raise SceneError(f"{path}: a .{suffix} cannot be read; {remedy} {as_obj}")

@@ -252,7 +252,7 @@ def _find_contacts(
     Places are those of the file; the ground, which blocks not built belong to, comes first.
     """
     facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
-    said = [
+    lines = [
         f"faces are found where blocks are no more than {length_text(float(f'{gap:.3g}'))} apart"
     ]
     faces = list[_Held]()
@@ -265,8 +265,8 @@ def _find_contacts(
             faces.append(((a, b), face))
     if len(bricks) == len(blocks):
         faces += _standing(bricks, facets, gap)
-        said.append("no supports are named: blocks with a face at the lowest level stand there")
-    return faces, said
+        lines.append("no supports are named: blocks with a face at the lowest level stand there")
+    return faces, lines
 
 
 def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:

@@ -145,6 +145,6 @@ def as_measured(scene: Scene, path: Path, standing: int) -> Scene:
     """Return a scene whose first ``standing`` bricks are where a file says, as of `as_built`."""
     where = read_measured(scene, path)
     if early := [n for n in where if n in scene.build_order[standing:]]:
-        said = f"brick {early[0]} does not stand yet; leave it out"
-        raise StepError(f"measured {path}: {said}")
+        text = f"brick {early[0]} does not stand yet; leave it out"
+        raise StepError(f"measured {path}: {text}")
     return as_built(scene, where)

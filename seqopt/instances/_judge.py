@@ -100,11 +100,11 @@ def judge_instance(
     if len(named) != 1:
         raise ProblemError(f"{where}: give one of {', '.join(WHAT)}")
     own = bounds is None or (isinstance(bounds, Sequence) and not len(bounds))
-    claims, said = (held.get("bounds", ()), where) if own else _loaded(bounds)
+    claims, source = (held.get("bounds", ()), where) if own else _loaded(bounds)
     if isinstance(claims, Mapping):
         claims = claims.get("bounds", [claims])
     if isinstance(claims, str) or not isinstance(claims, Sequence):
-        raise ProblemError(f"{said}: bounds are {short(claims)}; give a list, one for every goal")
+        raise ProblemError(f"{source}: bounds are {short(claims)}; give a list, one for every goal")
     names, values = [goal.name for goal in graph.goals], held.get("values", ())
     if isinstance(values, Mapping):
         _require_known(f"{where}, values", values, names)
@@ -113,7 +113,7 @@ def judge_instance(
     if len(known) > len(names):
         raise ProblemError(f"{where}: {len(known)} values for {len(names)} goals; leave some out")
     numbers = _numbers(f"{where}, {named[0]}", held[named[0]], whole=True)
-    bounds = [_claim(f"{said}, bound {k}", each) for k, each in enumerate(claims, start=1)]
+    bounds = [_claim(f"{source}, bound {k}", each) for k, each in enumerate(claims, start=1)]
     claimed = [value if np.isfinite(value) else None for value in known]
     return judge_path(graph, named[0], numbers, claimed, bounds)
 
@@ -313,8 +313,8 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value:
     known = [name for name, *_ in stage.limited]
     for name, price in claim.prices.items():
         if name not in known:
-            said = ", ".join(known) or "there are none"
-            raise SolverError(f"price of {name!r}: it is no cap or sum before; give {said}")
+            text = ", ".join(known) or "there are none"
+            raise SolverError(f"price of {name!r}: it is no cap or sum before; give {text}")
         if not price >= 0 or not np.isfinite(price):
             raise SolverError(f"price of {name!r} is {price:g}; give a number from 0")
     prices = [claim.prices.get(name, 0.0) for name in known]

@@ -87,9 +87,9 @@ def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
 def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
-    limit = {} if run.left == inf else {"seconds": run.left}
-    told: dict[str, Any] = {"watch": watch} if formulation.watched else limit
-    solve = partial(formulation.solve, deepcopy(instance), **run.options, **told)
+    limit: dict[str, Any] = {} if run.left == inf else {"seconds": run.left}
+    limit = {"watch": watch} if formulation.watched else limit
+    solve = partial(formulation.solve, deepcopy(instance), **run.options, **limit)
     try:
         with _answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, Solution, solve)
@@ -101,8 +101,8 @@ def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: 
         raise refusal(instance, name, exact=formulation.looks_at_all) from None
     except (NothingFoundError, TimeUpError) as error:
         low = watch.bound
-        said = f"{error} (no path is below {low:.6g})" if isfinite(low) else str(error)
-        raise (KeyboardInterrupt if watch.interrupted else type(error))(said) from error
+        text = f"{error} (no path is below {low:.6g})" if isfinite(low) else str(error)
+        raise (KeyboardInterrupt if watch.interrupted else type(error))(text) from error
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error

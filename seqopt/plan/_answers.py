@@ -151,13 +151,13 @@ def find(problem: States, formulation: Formulation, run: Run) -> Found:
     """
     check_run(formulation, run)
     start = time.perf_counter()
-    told: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
+    reported: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
     watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
     limit = {"watch": watch} if formulation.watched else {"seconds": run.left}
     limit = limit if formulation.watched or isfinite(run.left) else {}
     with _keep(problem.resources.executor, problem.resources.workers):
         with run.clock.needed("finding a first plan"):
-            options = {**run.options, **told, **limit}
+            options = {**run.options, **reported, **limit}
             selection = _choose_states(formulation, problem, options, run)
         stopped = run.clock.why(selection.stopped)
         selection = replace(selection, stopped=stopped, trace=watch.trace)
@@ -234,11 +234,11 @@ def _choose_states(
         why = INFEASIBLE.confirmed(*asked, exact=exact, explain=run.explains)
         standing = problem.standing
         if type(why) is SolverError and standing is not None and standing.curing is not None:
-            said = (
+            text = (
                 f"{error} in which all states stand while mortar cures, though some are once it "
                 "has; more robots may help, or mortar with some bond from 0 s on"
             )
-            why = INFEASIBLE.claimed(name, said, exact=exact)
+            why = INFEASIBLE.claimed(name, text, exact=exact)
         raise why from None
     vars(problem).update({key: vars(own)[key] for key in COUNTED if key in vars(own)})
     return with_numbers(name, selection, len(problem.goals))

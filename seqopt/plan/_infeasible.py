@@ -102,7 +102,7 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
         with suppress(InfeasibleError, NothingFoundError):
             within_budgets(graph, problem.budgets)
             return SolverError(f"formulation {name} {ALLOWED}")
-    said = list[str]()
+    lines = list[str]()
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         goal = problem.goals[k]
         least = -np.inf  # of a makespan
@@ -111,9 +111,9 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
         alone = " by itself" if least <= tied(cap) else ""
         at_least = f"{goal} is at least {value_text(goal.name, least)}{alone}, and "
         at_least *= bool(np.isfinite(least))
-        said.append(f"{at_least}{value_text(goal.name, cap)} is allowed")
+        lines.append(f"{at_least}{value_text(goal.name, cap)} is allowed")
     proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
-    why = f"{problem.title}: no plan is within all budgets; {', '.join(said)}"
+    why = f"{problem.title}: no plan is within all budgets; {', '.join(lines)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
 
 
@@ -216,10 +216,10 @@ def _fault(problem: States, level: int, state: Ints) -> str:
         for each in one.every_filter:
             if each.name != "payload" and not each.proven(states).all():
                 how = "does not" if each.refuted(states).any() else "is not proven to"
-                said = f"pass the filter {each.name}"
+                text = f"pass the filter {each.name}"
                 if each.name == "stands":
-                    said = " ".join(["stand", *(d.said for d in problem.demands[:1])])
-                return f"{how} {said}"
+                    text = " ".join(["stand", *(d.said for d in problem.demands[:1])])
+                return f"{how} {text}"
     return "asks more of robots than they carry"
 
 
@@ -314,8 +314,8 @@ def _payload(problem: States, look: Look, free: States | None) -> str:
         bricks, team = slice(*sorted(rules.span(scene))), rules.team(scene)
         every = (loads(s, s.robots[r])[bricks] for s in (scene, *problem.worlds) for r in team)
         least = max(look.least(free, LARGEST), *(float(own.max()) for own in every))
-    said, far = _payload_text(least), _beyond(problem.network, least)
-    return f"payload of {said} N (--payload {said}){far}"
+    text, far = _payload_text(least), _beyond(problem.network, least)
+    return f"payload of {text} N (--payload {text}){far}"
 
 
 def _beyond(network: Network, force: float) -> str:

@@ -210,8 +210,8 @@ class Plan(ShownBuild):
         found = self._within.departures(self._columns)
         if self.moved is None or not self.is_far or any(d.what == FAR_OFF for d in found):
             return found
-        said = f"{self.moved.share:.4g} times what the linear range allows, in a scenario"
-        return (Departure(FAR_OFF, said, (self.moved.step,)), *found)
+        text = f"{self.moved.share:.4g} times what the linear range allows, in a scenario"
+        return (Departure(FAR_OFF, text, (self.moved.step,)), *found)
 
     @property
     def states(self) -> States:

@@ -644,14 +644,14 @@ def parse_limits(
 
 def _limit_of(text: str, where: str) -> Limit:
     """Return a limit from ``NAME=VALUE``."""
-    (name, value), said = split_word(text), f"{where} {text}"
+    (name, value), line = split_word(text), f"{where} {text}"
     if name == "payload":
-        raise ProblemError(f"{said}: give payload alone, and values with --payload")
+        raise ProblemError(f"{line}: give payload alone, and values with --payload")
     if name == LINEAR_RANGE and value == LIFTED:
         return Limit(name, math.inf)
     if name == LINEAR_RANGE:
         try:
-            return Limit(name, number_word(value, said))
+            return Limit(name, number_word(value, line))
         except ProblemError as error:
             hint = f"give a share of it, as 0.5, or {LIFTED} to lift it"
             raise ProblemError(f"{error}; {hint}") from None
@@ -661,9 +661,9 @@ def _limit_of(text: str, where: str) -> Limit:
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
     if name == TOLERANCE or UNITS.get(name[0]) == "m":
         unit = next((unit for unit in _LENGTHS if value.endswith(unit)), "")
-        number = number_word(value.removesuffix(unit), said, "m, or a length as 20um or 0.02mm")
+        number = number_word(value.removesuffix(unit), line, "m, or a length as 20um or 0.02mm")
         return Limit(name, number * _LENGTHS.get(unit, 1.0))
-    return Limit(name, number_word(value, said, UNITS.get(name[0], "")))
+    return Limit(name, number_word(value, line, UNITS.get(name[0], "")))
 
 
 def register(*parts: Amount | Filter | Resource | Part) -> None:
@@ -709,8 +709,8 @@ def number_word(text: str, where: str, unit: str = "", *, zero: bool = False) ->
         value = -1.0
     if not 0 < value <= LARGEST and not (zero and value == 0):
         most = f" up to {LARGEST:g}" if value > LARGEST else ""
-        said = f"{text!r} is not a positive number{' or zero' * zero}{most}"
-        raise ProblemError(f"{where}: {said}{f'; give a number of {unit}' if unit else ''}")
+        line = f"{text!r} is not a positive number{' or zero' * zero}{most}"
+        raise ProblemError(f"{where}: {line}{f'; give a number of {unit}' if unit else ''}")
     return value
 
 

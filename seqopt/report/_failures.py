@@ -62,9 +62,9 @@ def cure_words(case: Mapping[Any, Any]) -> str:
     enough += [f"friction {friction:.3g}"] if np.isfinite(friction) else []
     open_ = np.isnan([bond, friction]).any()
     none = "what is enough is not proven" if open_ else "no bond or friction helps"
-    said = f"every step stands with {' or '.join(enough)}" if enough else none
+    text = f"every step stands with {' or '.join(enough)}" if enough else none
     more = "" if pd.isna(node) else f"; one more robot at node {int(node)} would hold this step"
-    return f"{said}{more}"
+    return f"{text}{more}"
 
 
 _NAME = 26  # columns of a build with what holds it

@@ -164,6 +164,6 @@ def _grip(
     if hold.node is not None:
         words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
     flat = room >= LETTER * len(words) + 0.06
-    said: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
-    said["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
-    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **said)
+    style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
+    style["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **style)

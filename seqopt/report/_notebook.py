@@ -37,14 +37,14 @@ STYLE = "display:block;max-width:100%;height:auto;background:#fff"
 
 def card(value: object) -> str:
     """Return what a value says of itself and, with matplotlib, small pictures of it, as HTML."""
-    said, images = [repr(value)], ""
+    lines, images = [repr(value)], ""
     if isinstance(value, Scene) and value.loading:
-        said.append(f"Beside the weight: {value.loading}.")
+        lines.append(f"Beside the weight: {value.loading}.")
     elif isinstance(value, ShownBuild) and _is_small(value):
         scene = value.engine.network.scene
-        said.append(_in_a_sentence(scene, value.responses(), (), value.departures))
+        lines.append(_in_a_sentence(scene, value.responses(), (), value.departures))
     elif isinstance(value, ShownBuild):
-        said.append("Responses and stability are not computed here: see responses(), stability().")
+        lines.append("Responses and stability are not computed here: see responses(), stability().")
     with suppress(ExtraError):
         for figure in _pictures(value):
             from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
@@ -54,8 +54,8 @@ def card(value: object) -> str:
             few = Image.open(large).convert("RGB").quantize(COLORS, Image.Quantize.FASTOCTREE)
             few.save(small, format="png", optimize=True)
             source = f"data:image/png;base64,{b64encode(small.getvalue()).decode()}"
-            images += f'<img alt="{escape(said[0])}" src="{source}" style="{STYLE}">'
-    return f"<div>{''.join(f'<p>{escape(line)}</p>' for line in said)}{images}</div>"
+            images += f'<img alt="{escape(lines[0])}" src="{source}" style="{STYLE}">'
+    return f"<div>{''.join(f'<p>{escape(line)}</p>' for line in lines)}{images}</div>"
 
 
 def _pictures(value: object) -> list[Figure]:

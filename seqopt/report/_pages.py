@@ -75,10 +75,10 @@ def _page(
     scatter: tuple[str, pd.DataFrame] | None = None,
 ) -> str:
     """Return a page of several builds, whose sentence also names their faults."""
-    said = builds_in_words({build.name: build.departures for build in builds})
-    if said and len(builds) == 1:
-        said = (*map(str, builds[0].departures),)
-    outside = f"{OUTSIDE.capitalize()}: {'; '.join(said)}. Do not rely on it. " if said else ""
+    lines = builds_in_words({build.name: build.departures for build in builds})
+    if lines and len(builds) == 1:
+        lines = (*map(str, builds[0].departures),)
+    outside = f"{OUTSIDE.capitalize()}: {'; '.join(lines)}. Do not rely on it. " if lines else ""
     count = sum(bool(overloads(engine.network.scene, build.table)) for build in builds)
     over = f"; in {count} of them a robot would hold more than its payload" if count else ""
     return report_page(engine, builds, f"{outside}{sentence}{over}.", tables, scatter)
@@ -86,8 +86,8 @@ def _page(
 
 def _captioned(caption: str, table: pd.DataFrame) -> tuple[str, pd.DataFrame]:
     """Return a table of builds under its caption, with a legend where it marks faults."""
-    said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
-    return f"{caption}{said}. Such steps are marked in red" if said else caption, table
+    text = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
+    return f"{caption}{text}. Such steps are marked in red" if text else caption, table
 
 
 def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
@@ -142,7 +142,7 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     scene = engine.network.scene
     builds = _builds(scene, result.tables, result.departures, result.verdicts)
     marks = {"overloaded": OVER, "outside": OUTSIDE}
-    marks = {name: said for name, said in marks.items() if result.table[name].any()}
+    marks = {name: text for name, text in marks.items() if result.table[name].any()}
     columns = ["problem", "objective", "gap", *IN_UNITS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""})
     shown = shown.assign(gap=100 * shown["gap"].astype(float))

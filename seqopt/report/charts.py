@@ -193,8 +193,8 @@ def _draw_shares(axes: Axes, cases: pd.DataFrame, rows: list[tuple[str, str]]) -
         i, k = rows.index((case["build"], case["holds"])), values.index(case["value"])
         share[i, k] = case["fall"] / case["steps"]
         color = "white" if share[i, k] > 0.6 else "black"
-        said = f"{case['fall']} of {case['steps']}"
-        axes.text(k + 0.5, i + 0.5, said, ha="center", va="center", fontsize=SMALL, color=color)
+        text = f"{case['fall']} of {case['steps']}"
+        axes.text(k + 0.5, i + 0.5, text, ha="center", va="center", fontsize=SMALL, color=color)
     axes.pcolormesh(share, cmap="OrRd", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
     axes.set_xticks(np.arange(len(values)) + 0.5, [f"{value:.3g}" for value in values])
 

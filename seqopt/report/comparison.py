@@ -438,9 +438,9 @@ def format_comparison(
         )
         blocks.append(["How the grips were chosen", *_choices(comparison), "", about])
     for heading, of_paper in (("Notes", False), ("Inconsistencies in the paper", True)):
-        said = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
-        if said:
-            blocks.append([heading, *(f"- {text.removeprefix(OF_PAPER)}" for text in said)])
+        lines = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
+        if lines:
+            blocks.append([heading, *(f"- {text.removeprefix(OF_PAPER)}" for text in lines)])
 
     def wrapped(line: str) -> str:
         if "  " in line:  # a row of a table
@@ -487,9 +487,9 @@ def _responses(comparison: Comparison) -> Iterator[str]:
         marks = {"F_rob": "!" if row["overloaded"] else " ", "D_max": "?" * bool(row["outside"])}
         for response, (_, _, width) in HEADS.items():
             value = float(row[response])
-            said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
-            said += f" ({paper[response]:.1f})" if response in paper else ""
-            out += f"{said + marks.get(response, ''):>{width}}"
+            text = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
+            text += f" ({paper[response]:.1f})" if response in paper else ""
+            out += f"{text + marks.get(response, ''):>{width}}"
         return out
 
     figures = comparison.table[[*HEADS]].astype(float).round(3).apply(tuple, axis=1).to_dict()
@@ -527,19 +527,19 @@ def _printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
 
 
 def _about(comparison: Comparison) -> str:
-    said = (
+    text = (
         "Grip force: of any robot. Support moment: at any ground end. Tension: in any edge of "
         "the network of bricks and joints. Displacement: of any node."
     )
     if comparison.table["overloaded"].astype(bool).any():
-        said += " !: a robot holds more than its payload."
+        text += " !: a robot holds more than its payload."
     if comparison.departures:
-        said += " ?: outside the linear range, not reliable."
+        text += " ?: outside the linear range, not reliable."
     if comparison.printed is not None:
-        said += " In brackets: what Bruun et al. print."
+        text += " In brackets: what Bruun et al. print."
     if " +" in "".join(_responses(comparison)):
-        said += " +1, +2 …: so many other methods or formulations reach the same figures."
-    return said
+        text += " +1, +2 …: so many other methods or formulations reach the same figures."
+    return text
 
 
 def _choices(comparison: Comparison) -> Iterator[str]:

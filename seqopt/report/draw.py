@@ -179,7 +179,7 @@ def force_key(largest_force: float) -> list[Line2D]:
     entries = [(TENSION, THICK / 2, "tension"), (COMPRESSION, THICK / 2, "compression")]
     for share in (0.1, 0.5, 1.0):
         entries.append((INK, THIN + (THICK - THIN) * share, f"{share * largest_force:.0f} N"))
-    return [Line2D([], [], color=color, lw=width, label=said) for color, width, said in entries]
+    return [Line2D([], [], color=color, lw=width, label=text) for color, width, text in entries]
 
 
 def draw_bricks(  # what is drawn, and how, each by its name

@@ -163,7 +163,7 @@ def _build_data(
         "name": build.name,
         "bounds": dict(build.bounds),
         "rank": [build.order.index(n) for n in scene.build_order] if build.order else None,
-        "stands": [" and ".join(said) for said in zip(*stands, strict=True)],
+        "stands": [" and ".join(each) for each in zip(*stands, strict=True)],
         "marks": _marks(scene, build),
         "verdicts": [
             {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
@@ -192,16 +192,16 @@ def _marks(scene: Scene, build: Build) -> list[str]:
     """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
     over, props, out = overloads(scene, build.table), _prop_faults(scene, build.table), []
     for step in build.steps:
-        said = [
+        lines = [
             f"{_robot_words(each.robot)} exceeds its payload"
             for each in over
             if step.number in each.steps
         ]
-        said += ["a prop bears more than it may" for each in props if step.number in each.steps]
+        lines += ["a prop bears more than it may" for each in props if step.number in each.steps]
         left = [each.what for each in build.departures if step.number in each.steps]
-        said += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
-        said += [f"falls {each.how}" for each in build.verdicts[-1:] if each.falls(step.number)]
-        out.append("; ".join(said))
+        lines += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
+        lines += [f"falls {each.how}" for each in build.verdicts[-1:] if each.falls(step.number)]
+        out.append("; ".join(lines))
     return out
 
 

@@ -26,7 +26,7 @@ from seqopt.plan.plan import Plan
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.stability.verdict import Verdict
-from seqopt.work import Stage, Tell, hire, map_ordered
+from seqopt.work import Stage, Tell, map_ordered, worker_pool
 from seqopt.workflow import optimize
 
 RANGE = re.compile(r"(?P<low>[^,=]+?)\.\.(?P<high>[^,=/]+)/(?P<count>\d+)(?P<log>log)?")
@@ -127,9 +127,9 @@ def sweep(
             progress(Stage("problems", sum(name in rows for name in names) / len(names)))
 
     solve = partial(_row, plan, tuple(mortars))
-    with hire(executor, workers) as crew:
-        begun = todo if crew is None else todo[::-1]  # ranges go up: the largest is not left alone
-        with closing(map_ordered(solve, begun, crew, done)) as found:
+    with worker_pool(executor, workers) as pool:
+        begun = todo if pool is None else todo[::-1]  # ranges go up: the largest is not left alone
+        with closing(map_ordered(solve, begun, pool, done)) as found:
             deque(found, maxlen=0)
     return _table(rows, names)
 
@@ -142,7 +142,7 @@ def _row(
     try:
         found = plan(load_scene(scene) if isinstance(scene, str | Path) else scene)
     except SeqoptError as error:
-        status = next((said for kind, said in WHY.items() if isinstance(error, kind)), "refused")
+        status = next((text for kind, text in WHY.items() if isinstance(error, kind)), "refused")
         row: dict[str, Any] = {"status": status, "why": str(error)}
     else:
         falls = {name: found.verdicts(name) for name in mortars}

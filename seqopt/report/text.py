@@ -39,9 +39,9 @@ def _headline(scene: Scene, table: _Columns) -> str:
     force, moved = (float(np.nanmax(each, initial=0.0)) for each in along)
     use = max(payload_uses(scene, table), key=attrgetter("share"))
     does = "" if use.brick is None else f" carries brick {use.brick}"
-    said = f"largest force {_plain(force, 3)} N; payloads used up to {_plain(100 * use.share, 3)} %"
-    said += f" ({use.robot}{does}, step {use.step})"
-    return f"{said}; displacement {length_text(float(f'{moved:.3g}'))}"
+    text = f"largest force {_plain(force, 3)} N; payloads used up to {_plain(100 * use.share, 3)} %"
+    text += f" ({use.robot}{does}, step {use.step})"
+    return f"{text}; displacement {length_text(float(f'{moved:.3g}'))}"
 
 
 def _deciding_step(
@@ -82,20 +82,20 @@ def _in_a_sentence(
     over = _overloaded(scene, table)
     fallen = [phrase for each in verdicts[-1:] if each.first for phrase in _falls(each)]
     wrong = [*over, *faults, *fallen]
-    said = [f"{does} {scene.name} in {len(table):,} steps"]
+    lines = [f"{does} {scene.name} in {len(table):,} steps"]
     if wrong:
-        said = [f"Not buildable: {'; '.join(wrong)}"]
+        lines = [f"Not buildable: {'; '.join(wrong)}"]
     if not over:
         most = max(payload_uses(scene, table), key=attrgetter("share"))
         carries = "" if most.brick is None else f" carries brick {most.brick}"
         who = f"{_robot_words(most.robot)}{carries} in step {most.step}"
-        said.append(f"all within payload, {100 * most.share:.0f} % at most ({who})")
+        lines.append(f"all within payload, {100 * most.share:.0f} % at most ({who})")
     moves = _settlement_said(scene) if verdicts else ""
-    said += [*_stands(verdicts[:-1] if fallen else verdicts), *([moves] if moves else [])] or (
+    lines += [*_stands(verdicts[:-1] if fallen else verdicts), *([moves] if moves else [])] or (
         [] if verdicts else ["whether its steps stand was not asked"]
     )
     outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. Do not rely on it. "
-    return (outside if departures else "") + "; ".join(said) + "."
+    return (outside if departures else "") + "; ".join(lines) + "."
 
 
 def _overloaded(scene: Scene, table: pd.DataFrame) -> list[str]:

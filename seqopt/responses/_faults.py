@@ -50,13 +50,13 @@ def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
             if found.verdict is Verdict.FALLS:
                 why = "a motion proves that it falls, robots within payload"
                 mode = zip(engine.network.scene.build_order, map(tuple, found.motion), strict=False)
-                said = f"step {step.number}: {why}; add a grip, a bond or friction"
-                return MechanismError(said, (*mode,))
+                text = f"step {step.number}: {why}; add a grip, a bond or friction"
+                return MechanismError(text, (*mode,))
         return error
     numbers = engine.network.scene.grip_numbers(step.grips, step.bricks)
-    told = diagnose(engine.network, step.bricks, numbers)
-    if told.finding is Finding.MECHANISM:
-        return MechanismError(f"step {step.number}: {told.reason}; add a grip or a joint")
+    diagnosis = diagnose(engine.network, step.bricks, numbers)
+    if diagnosis.finding is Finding.MECHANISM:
+        return MechanismError(f"step {step.number}: {diagnosis.reason}; add a grip or a joint")
     return error
 
 

@@ -37,7 +37,7 @@ from seqopt.responses.quantities import (
     require_finite,
 )
 from seqopt.sequence.steps import Step
-from seqopt.work import Progress, Tell, _one_thread, hire, map_ordered
+from seqopt.work import Progress, Tell, _one_thread, map_ordered, worker_pool
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
@@ -128,7 +128,7 @@ class Block(FrozenValue):
     def with_errors(self, rows: Floats, fields: Fields) -> Floats:
         """Return rows (S, R + r), and beside them what six digits may be off, as many columns.
 
-        Fields err by a share of the largest entry of each, whatever else they hold.
+        Fields err by a share of the largest entry of each.
         """
         largest = dict[Want, Floats]()
         for name, flag in FLAGS.items():
@@ -307,14 +307,14 @@ def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floa
 
     def done(part: Block, found: tuple[Floats, int]) -> None:
         progress.add(work(len(part.grips), part.bricks))
-        if crew is not None and isinstance(engine, NamedEngine):  # else it has counted itself
+        if pool is not None and isinstance(engine, NamedEngine):  # else it has counted itself
             engine.answered += len(part.grips)
             engine.corrected += found[1]
 
     rows = [np.zeros((0, sets.width))]
-    with hire(own.executor, own.workers) as crew:
-        task = partial(_answer, engine if crew is None else packed(engine))
-        with closing(map_ordered(task, parts, crew, done)) as answers:
+    with worker_pool(own.executor, own.workers) as pool:
+        task = partial(_answer, engine if pool is None else packed(engine))
+        with closing(map_ordered(task, parts, pool, done)) as answers:
             rows += [found for found, _ in answers]
     return np.concatenate(rows)
 

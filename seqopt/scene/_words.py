@@ -32,8 +32,8 @@ def parse_grips(text: str) -> tuple[Any, Any]:
         try:
             numbers = [] if word in ("", "rigid") else [float(one) for one in word.split("x")]
         except ValueError:
-            said = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5 (N/m)"
-            raise SceneError(f"{where}: {said}") from None
+            line = f"{word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5 (N/m)"
+            raise SceneError(f"{where}: {line}") from None
         found.append(None if not numbers else numbers[0] if len(numbers) == 1 else tuple(numbers))
     return found[0], found[1]
 

@@ -101,8 +101,8 @@ class ArchShape(Terse):
             if (values := getattr(self, name)) is None:
                 continue
             if len(values) != bricks:
-                said = f"{len(values)} {name} and {bricks} pitch values"
-                raise SceneError(f"arch: {said}; give as many")
+                text = f"{len(values)} {name} and {bricks} pitch values"
+                raise SceneError(f"arch: {text}; give as many")
             largest = max(map(abs, values))
             if name != "offset" and largest > 2 * math.pi:
                 warnings.warn(

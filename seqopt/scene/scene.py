@@ -208,9 +208,9 @@ class Scene(Shown):
             why = "occurs twice" if name in names else "is no brick"
             raise SceneError(f"{where}: build_order: {name} {why}; name every brick once")
         if left := names - {*self.build_order}:
-            said = f"{len(left)} bricks are missing, {min(left)} among them"
-            said = f"brick {min(left)} is missing" if len(left) == 1 else said
-            raise SceneError(f"{where}: build_order: {said}; name every brick once")
+            text = f"{len(left)} bricks are missing, {min(left)} among them"
+            text = f"brick {min(left)} is missing" if len(left) == 1 else text
+            raise SceneError(f"{where}: build_order: {text}; name every brick once")
         _known(f"{where}: blocked_nodes", "node", self.blocked_nodes, {*self.brick_of_node})
         for brick in self.bricks:
             if brick.placing_node in self.blocked_nodes:
@@ -283,13 +283,13 @@ class Scene(Shown):
         largest = max((math.hypot(*load.force) for load in self.loads), default=0.0)
         wind = ", ".join(f"{share:.3g}" for share in self.wind)
         forces, moved = len(self.loads), sum(any(g.movement or ()) for g in self.grounds)
-        said = {
+        words = {
             f"{forces} force{'s' * (forces != 1)}, up to {largest:g} N": forces,
             f"wind of ({wind}) times the weight": any(self.wind),
             f"weights times {self.weight_factor:g}": self.weight_factor != 1,
             f"movement of {moved} ground end{'s' * (moved != 1)}": moved,
         }
-        return ", ".join(text for text, counts in said.items() if counts)
+        return ", ".join(text for text, counts in words.items() if counts)
 
     def with_robots(self, *robots: Robot) -> Scene:
         """Return the same scene with other robots, ``*robots``: all of the new scene."""

@@ -73,8 +73,8 @@ class Part:
             raise StepError(f"missing {wrong[0]}: give the number of a brick")
         changes = (*(("lost", n) for n in self.lost), *(("missing", n) for n in self.missing))
         if changes and begin.site is None:
-            said = "a build that goes on has changed; say where it begins"
-            raise StepError("{} {}: {}".format(*changes[0], said))
+            text = "a build that goes on has changed; say where it begins"
+            raise StepError("{} {}: {}".format(*changes[0], text))
         return begin
 
 

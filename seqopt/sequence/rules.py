@@ -310,9 +310,9 @@ class FreeRules:
             yield "newest=free", replace(self, newest=Newest.FREE)
         if self.regrips is not None:
             yield f"regrips={self.regrips + 1}", replace(self, regrips=self.regrips + 1)
-        for name, value, said in _LOOSEST:
+        for name, value, word in _LOOSEST:
             if getattr(self, name) != value:
-                yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
+                yield f"{name}={word}", replace(self, **{name: value})  # type: ignore[arg-type]
 
 
 _CHOICES: dict[str, type[Enum]] = {
@@ -346,7 +346,7 @@ def parse_rules(given: FreeRules | str | Sequence[FreeRules | str]) -> FreeRules
     several = given if isinstance(given, list | tuple) else (given,)
     if {*map(type, several)} - {str, FreeRules}:
         raise StepError(f"rules {short(given)}: give a seqopt.FreeRules, or as least_grips=1")
-    found, loosest = FreeRules(), {(name, said): value for name, value, said in _LOOSEST}
+    found, loosest = FreeRules(), {(name, word): value for name, value, word in _LOOSEST}
     for each in several:
         if not isinstance(each, str):
             found = each

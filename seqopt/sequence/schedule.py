@@ -270,8 +270,8 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     kept, all_ = (sum(len(m.candidates) for m in some) for some in (moves, schedule.moves))
     if kept == all_:
         return schedule
-    said = f"{near} keeps {kept:,} of {all_:,} candidates"
-    return replace(schedule, moves=moves, left_out=said)
+    text = f"{near} keeps {kept:,} of {all_:,} candidates"
+    return replace(schedule, moves=moves, left_out=text)
 
 
 def islands(network: Network, bricks: int) -> tuple[frozenset[int], ...]:

@@ -544,8 +544,8 @@ class Margins:
         which values it lies, N; infinite if none is enough. Not where props only push.
         """
         if any(prop.direction for prop in self.network.scene.props):
-            said = "the least payload is not found where props only push"
-            raise SceneError(f"{said}; leave payloads out of the margins")
+            text = "the least payload is not found where props only push"
+            raise SceneError(f"{text}; leave payloads out of the margins")
 
         def cases(assembly: Assembly) -> list[Case]:
             return [replace(bonded(assembly, self.mortar).fixed(), payload=(0.0, 1.0))]

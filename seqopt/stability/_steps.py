@@ -46,7 +46,7 @@ from seqopt.stability.limit_analysis import (
     violation,
 )
 from seqopt.stability.verdict import ASSESSED, Verdict
-from seqopt.work import Tell, _one_thread, hire, map_ordered, with_progress
+from seqopt.work import Tell, _one_thread, map_ordered, with_progress, worker_pool
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
@@ -312,13 +312,13 @@ def each_stability(
     """
     find = partial(_each, mortar=mortar, margins=margins)
     parts = parts_of(network, steps)
-    with hire(*shared) as crew:
-        if crew is None:
+    with worker_pool(*shared) as pool:
+        if pool is None:
             yield from find(parts, steps)
             return
-        size = -(-len(steps) // (_CHUNKS * crew.workers)) or 1
+        size = -(-len(steps) // (_CHUNKS * pool.workers)) or 1
         chunks = [tuple(steps[i : i + size]) for i in range(0, len(steps), size)]
-        for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, crew):
+        for found in map_ordered(partial(_in_worker, pickle.dumps(parts), find), chunks, pool):
             yield from found
 
 

@@ -100,9 +100,9 @@ class BuildVerdicts:
     def __str__(self) -> str:
         steps = len(self.verdicts)
         counts = [(self.count(verdict), verdict) for verdict in _MANY]
-        said = [f"{n} of {steps} steps {WORDS[v] if n == 1 else _MANY[v]}" for n, v in counts if n]
+        lines = [f"{n} of {steps} steps {WORDS[v] if n == 1 else _MANY[v]}" for n, v in counts if n]
         first = f", first {self.first_said}" if self.first else ""
-        return f"{self.how}: {'; '.join(said) or 'every step stands'}{first}"
+        return f"{self.how}: {'; '.join(lines) or 'every step stands'}{first}"
 
 
 class BuildProver:
@@ -130,10 +130,10 @@ class BuildProver:
     @property
     def notes(self) -> tuple[str, ...]:
         """Why verdicts are missing, and which effects they neglect, in words."""
-        said = [f"not proven; {self.refusal}"] if self.refusal else []
+        lines = [f"not proven; {self.refusal}"] if self.refusal else []
         if self.mortars and (moves := _settlement_said(self.network.scene)):
-            said.append(moves)
-        return tuple(f"stability: {each}" for each in said)
+            lines.append(moves)
+        return tuple(f"stability: {each}" for each in lines)
 
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
@@ -338,8 +338,8 @@ def failure_map(
     values, least = values or AXES[axis], DRY.friction if axis == "friction" else 0.0
     usual = min(values, key=lambda value: abs(value - least))
     asked = [*_cases(scene, builds, holds, axis, values)]
-    told = with_progress("mapping failures", asked, progress)
-    rows = [_row(case, axis, value) for value, case in told]
+    cases = with_progress("mapping failures", asked, progress)
+    rows = [_row(case, axis, value) for value, case in cases]
     steps = list[pd.DataFrame]()
     for value, case in asked:
         own = {"build": case.build, "holds": case.holds, "axis": axis, "value": value}

@@ -287,8 +287,8 @@ def find_standing(
         then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never.
         What is let go waits for it (default: full at once).
     """
-    said = {"tilt": tilt, "friction": friction, "curing": curing}
-    names = [name for name, value in said.items() if value not in (None, ())]
+    words = {"tilt": tilt, "friction": friction, "curing": curing}
+    names = [name for name, value in words.items() if value not in (None, ())]
     if stands is None:
         if names:
             usual = "epoxy" if names[0] == "curing" else "dry"

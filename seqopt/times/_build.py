@@ -61,8 +61,8 @@ def times(
     build = find_build(scene, steps, robots=robots, cache=cache, progress=progress)
     standing = stands if isinstance(stands, Standing) else None
     if stands is not None and (standing is None or standing.curing is None):
-        said = "here it goes with curing of mortar that has a bond; seqopt assess says what stands"
-        raise ProblemError(f"stands: {said}")
+        text = "here it goes with curing of mortar that has a bond; seqopt assess says what stands"
+        raise ProblemError(f"stands: {text}")
     own = build.reassigned() if reassign else build.steps
     out = GivenSequence(build.engine, own, build.title, standing=standing, result=build.result)
     try:

@@ -74,15 +74,15 @@ def with_durations(scene: Scene, *texts: str) -> Scene:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
         known = dict.fromkeys(NAMES, (float, f"a number of s, as {EXAMPLE}"))
-        said = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
+        given = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):
             before = out[index]
-            lacking = [each for each in NAMES if each not in said and each != "speed"]
+            lacking = [each for each in NAMES if each not in given and each != "speed"]
             if before is None and lacking:
                 raise SceneError(
                     f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give "
                     f"all, as {EXAMPLE}"
                 )
-            out[index] = Durations(**said) if before is None else replace(before, **said)
+            out[index] = Durations(**given) if before is None else replace(before, **given)
     pairs = zip(scene.robots, out, strict=True)
     return scene.with_robots(*(replace(robot, durations=each) for robot, each in pairs))

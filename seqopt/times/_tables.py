@@ -145,6 +145,6 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
     table = build.times()
     waits = table[table["cures_s"] > 0]
     steps, total = f"{len(waits)} step{'s' * (len(waits) > 1)}", waits["cures_s"].sum()
-    said = f"{total:.6g} s are waits for mortar, in {steps}"
-    yield said if len(waits) else "no step waits for mortar"
+    text = f"{total:.6g} s are waits for mortar, in {steps}"
+    yield text if len(waits) else "no step waits for mortar"
     yield "every state is proven to stand with the bond that its joints have when it begins"

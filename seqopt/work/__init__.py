@@ -8,9 +8,9 @@ Workers are processes of our own or an executor of the caller. Our own end with 
 them, however that ends. One that dies ends the computation in an error of one line: it lacked
 memory, and so would another.
 
->>> from seqopt.work import hire, map_ordered
->>> with hire(workers=1) as crew:  # more workers are processes
-...     list(map_ordered(abs, [-3, 2], crew))
+>>> from seqopt.work import map_ordered, worker_pool
+>>> with worker_pool(workers=1) as pool:  # more workers are processes
+...     list(map_ordered(abs, [-3, 2], pool))
 [3, 2]
 
 Beside it: threads of linear algebra, how far a computation is and what ends it early.
@@ -45,7 +45,7 @@ from threadpoolctl import ThreadpoolController
 
 from seqopt.errors import MemoryShortError, TimeUpError, WorkerError, message_of
 
-__all__ = ["Crew", "Progress", "Stage", "hire", "map_ordered"]
+__all__ = ["Progress", "Stage", "WorkerPool", "map_ordered", "worker_pool"]
 
 _Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
@@ -114,7 +114,7 @@ class _Processes(ProcessPoolExecutor):
 
     def __init__(self, workers: int) -> None:
         context = multiprocessing.get_context("spawn")  # threads and fork do not go together
-        end, self.leash = context.Pipe(duplex=False)
+        end, self.pipe = context.Pipe(duplex=False)
         super().__init__(workers, context, _follow, (end,))
 
     def submit(self, function: Callable[..., Any], /, *tasks: object, **named: Any) -> Future[Any]:
@@ -136,14 +136,14 @@ class _Processes(ProcessPoolExecutor):
         started: dict[int, Any] = getattr(self, "_processes", None) or {}
         if all(process.is_alive() for process in [*started.values()]):
             return
-        self.leash.close()
+        self.pipe.close()
         results = getattr(self, "_result_queue", None)  # there is no public way to it
         if writer := getattr(results, "_writer", None):
             writer.close()
 
 
 def _follow(end: Connection) -> None:
-    """Let a process of ours live no longer than its leash, and leave interrupts to its master."""
+    """Let a process of ours live no longer than its parent, and leave interrupts to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # errors are sent
     warnings.simplefilter("ignore", RuntimeWarning)
@@ -157,8 +157,8 @@ def _follow(end: Connection) -> None:
     threading.Thread(target=wait_and_end, daemon=True).start()
 
 
-class Crew(NamedTuple):
-    """Workers that are hired.
+class WorkerPool(NamedTuple):
+    """An executor and how many workers it has.
 
     Attributes
     ----------
@@ -171,12 +171,12 @@ class Crew(NamedTuple):
     workers: int
 
 
-_KEPT: ContextVar[Crew | None] = ContextVar("_KEPT", default=None)
+_KEPT: ContextVar[WorkerPool | None] = ContextVar("_KEPT", default=None)
 
 
 @contextmanager
-def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
-    """Hire workers for the duration of a with block.
+def worker_pool(executor: Executor | None = None, workers: int = 1) -> Iterator[WorkerPool | None]:
+    """Open a pool of workers for the duration of a with block.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
 
     Yields
     ------
-    Crew or None
+    WorkerPool or None
         None where there is but this process.
     """
     kept = _KEPT.get()
@@ -197,24 +197,24 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
     if executor is not None:
         known = getattr(executor, "_max_workers", None)
         most = known if isinstance(known, int) else 16  # where it does not say
-        yield Crew(executor, workers if workers > 1 else most)
+        yield WorkerPool(executor, workers if workers > 1 else most)
         return
     processes = _Processes(workers)
     try:
-        yield Crew(processes, workers)
+        yield WorkerPool(processes, workers)
     except BaseException:
-        processes.leash.close()  # at once; else when all that is under way is done
+        processes.pipe.close()  # at once; else when all that is under way is done
         raise
     finally:
         processes.shutdown(wait=True, cancel_futures=True)
-        processes.leash.close()
+        processes.pipe.close()
 
 
 @contextmanager
 def _keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
-    """Hire workers once for all who `hire` some within a with block."""
-    with hire(executor, workers) as crew:
-        before = _KEPT.set(crew)
+    """Open one pool for every `worker_pool` within a with block."""
+    with worker_pool(executor, workers) as pool:
+        before = _KEPT.set(pool)
         try:
             yield
         finally:
@@ -228,7 +228,7 @@ _PATIENCE = 1.0  # s without an answer, after which workers are looked after
 def map_ordered(
     function: Callable[[_Task], _Result],
     tasks: Iterable[_Task],
-    crew: Crew | None = None,
+    pool: WorkerPool | None = None,
     done: Callable[[_Task, _Result], None] | None = None,
 ) -> Generator[_Result, None, None]:
     """Return what a function makes of every task, in their order.
@@ -239,8 +239,8 @@ def map_ordered(
         Takes a task; of a module, or a `functools.partial` of such a one.
     tasks : iterable
         Taken as they are needed.
-    crew : Crew, optional
-        From `hire`; by default this process.
+    pool : WorkerPool, optional
+        From `worker_pool`; by default this process.
     done : callable, optional
         Called with every task and its result, as soon as there is one.
 
@@ -254,8 +254,8 @@ def map_ordered(
     WorkerError
         If a worker ends without an answer, or an executor takes no more work.
     """
-    if crew is not None:
-        yield from _map_by_workers(function, tasks, crew, done)
+    if pool is not None:
+        yield from _map_by_workers(function, tasks, pool, done)
         return
     for task in tasks:
         result = function(task)
@@ -267,19 +267,19 @@ def map_ordered(
 def _map_by_workers(
     function: Callable[[_Task], _Result],
     tasks: Iterable[_Task],
-    crew: Crew,
+    pool: WorkerPool,
     done: Callable[[_Task, _Result], None] | None,
 ) -> Generator[_Result, None, None]:
     """Yield the results of tasks in order, of which some are always under way."""
     running, ready = dict[Future[Any], tuple[int, _Task]](), dict[int, tuple[bool, Any]]()
     numbered, taken = enumerate(tasks), 0
-    own = crew.executor if isinstance(crew.executor, _Processes) else None
+    own = pool.executor if isinstance(pool.executor, _Processes) else None
     try:
         while True:
-            room = _UNDER_WAY * crew.workers - len(running) - len(ready)
+            room = _UNDER_WAY * pool.workers - len(running) - len(ready)
             for number, task in islice(numbered, room):
                 with _failing_as_workers():
-                    running[crew.executor.submit(_attempt, function, task)] = number, task
+                    running[pool.executor.submit(_attempt, function, task)] = number, task
             if taken in ready:
                 fine, result = ready.pop(taken)
                 taken += 1
@@ -358,8 +358,8 @@ class Stage:
     left: float | None = None
 
     def __str__(self) -> str:
-        said = f"{self.what}: {100 * self.share:.0f} %"
-        return said if self.left is None else f"{said}, {duration(self.left)} left"
+        text = f"{self.what}: {100 * self.share:.0f} %"
+        return text if self.left is None else f"{text}, {duration(self.left)} left"
 
 
 class Progress:
@@ -427,7 +427,7 @@ _ENDS = tuple(
 
 
 @contextmanager
-def _answered(told: Callable[[], object]) -> Iterator[None]:
+def _answered(call: Callable[[], object]) -> Iterator[None]:
     """Answer the first termination signal by a call; a second one is handled as before.
 
     Signals with foreign handlers are left to these. The call runs between two instructions of the
@@ -442,7 +442,7 @@ def _answered(told: Callable[[], object]) -> Iterator[None]:
 
     def note(_: int, __: FrameType | None) -> None:
         give_back()
-        told()
+        call()
 
     try:
         for number in numbers:

@@ -31,32 +31,22 @@ def plane_bond(assembly, friction):
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     matrix = assembly.contact_map.toarray()
     equal = np.hstack([matrix, np.zeros((len(matrix), 1))])
-    rows, right = [], []
+    rows = []
     for i in range(k):
         row = np.zeros(3 * k + 1)
         row[3 * i], row[-1] = -1.0, -share[i]
         rows.append(row)
         for j in (1, 2):
-            if along[i, j]:
-                for sign in (1.0, -1.0):
-                    row = np.zeros(3 * k + 1)
-                    row[3 * i + j], row[3 * i], row[-1] = (
-                        sign,
-                        -friction,
-                        -share[i] * (1 + friction),
-                    )
-                    rows.append(row)
-            else:
-                for sign in (1.0, -1.0):
-                    row = np.zeros(3 * k + 1)
-                    row[3 * i + j] = sign
-                    rows.append(row)
-        right = np.zeros(len(rows))
+            for sign in (1.0, -1.0):
+                row = np.zeros(3 * k + 1)
+                row[3 * i + j] = sign
+                if along[i, j]:
+                    row[3 * i], row[-1] = -friction, -share[i] * (1 + friction)
+                rows.append(row)
     cost = np.eye(3 * k + 1)[-1]
-    bounds = [(None, None)] * (3 * k) + [(0, None)]
-    answer = linprog(
-        cost, np.array(rows), right, equal, -assembly.load(), bounds=bounds, method="highs"
-    )
+    limits, right = np.array(rows), np.zeros(len(rows))
+    load, bounds = -assembly.load(), [(None, None)] * (3 * k) + [(0, None)]
+    answer = linprog(cost, limits, right, equal, load, bounds=bounds, method="highs")
     assert answer.status == 0
     return answer.fun
 

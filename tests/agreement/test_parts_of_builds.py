@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cache
 from itertools import permutations, product
 
-import networkx as nx
 import numpy as np
 import pytest
 
@@ -25,7 +24,6 @@ from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 
 AIMS = ("minmax,steps", "steps,minmax", "sum", "travel,steps", "minmax,regrips,steps")
-FEW = ("minmax,steps", "steps,minmax", "travel,steps")
 PLANS = [
     pytest.param(name, marks=[pytest.mark.slow] * (name not in ("schedule_search", "overlap_lp")))
     for name, found in formulations("goals").items()
@@ -105,24 +103,17 @@ def test_every_formulation_begins_where_it_is_told(formulation):
         assert same(found, best_from(begin, aim)), why
 
 
-@pytest.mark.parametrize("aim", FEW[1:])
+@pytest.mark.parametrize("aim", ["steps,minmax", "travel,steps"])
 def test_the_rest_of_the_best_plan_is_the_best_rest(aim):
-    engine = engine_of(4, 3)
+    """What was done and what is left add up."""
+    engine, first = engine_of(4, 3), aim.split(",")[0]
     plan = seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, aim))
     for count in range(0, len(plan.steps), 3):
         begin = Site.after(plan.steps, count)
         rest = seqopt.solve(seqopt.pose(engine, FreeRules(begin=begin), ONES, aim))
         assert rest.steps[0].number == count + 1
-        first = aim.split(",")[0]
-        sums = first in ("sum", "travel", "steps")
-        if sums:  # what was done and what is left add up
-            done = FreeRules(finish=begin)
-            before = planned(engine, done, first)[0] if count else 0.0
-            assert np.isclose(before + rest.objective[first], plan.objective[first], rtol=1e-9)
-        else:
-            assert rest.objective[first] <= plan.objective[first] * (1 + 1e-9)
-        if aim.endswith("steps") and first == "minmax" and count == 0:
-            assert values_of(rest) == pytest.approx(values_of(plan), rel=1e-9)
+        before = planned(engine, FreeRules(finish=begin), first)[0] if count else 0.0
+        assert np.isclose(before + rest.objective[first], plan.objective[first], rtol=1e-9)
 
 
 def test_parts_of_builds_are_of_the_free_schedule():
@@ -195,13 +186,11 @@ def test_what_no_rule_allows_is_named():
 def test_sites_follow_the_steps():
     engine = engine_of(4, 3)
     plan = seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, "minmax,steps"))
-    held = nx.Graph()
     for count in range(1, len(plan.steps) + 1):
         site, step = Site.after(plan.steps, count), plan.steps[count - 1]
         assert (site.bricks, site.grips, site.step) == (step.bricks, step.grips, step.number)
         free = [n for n, g in zip(site.stays, site.grips, strict=True) if g is not None]
         assert free.count(None) == len(free)
-        held.add_node(count)
         if step.kind is StepKind.PLACE:
             assert site.regrips == 0
     assert Site.after(plan.steps, 0) == Site(0)

@@ -21,27 +21,39 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import in_order
 from seqopt.sequence.methods import three_robot_loop
-from tests.arms.scenes import TOOL, beside, two_arms
+from tests.arms.scenes import beside, two_arms
 from tests.brute_force import least_peak, peaks, shortest, whole_graph
+from tests.refusals import one_line
 from tests.soft_bodies import SoftBodies
 
 ARM = {"urdf": "robot.urdf", "position": (0.0, 1.0, 0.0), "tool_length": 0.3, "tool_radius": 0.05}
 
 
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"urdf": 3}, "urdf is 3; give the path of a URDF, or package:path"),
-        ({"tool_length": 0.0}, "tool_length is 0.0; give a positive number of m"),
-        ({"x_axis": (1.0, 1.0, 0.0)}, "give perpendicular unit vectors"),
-        ({"fingers": 0.3}, "fingers stand out 0.3 m from a brick"),
-        ({"faces": ("top",)}, "faces are ('top',); give some of length, width, thickness"),
-        ({"joint_stiffness": (1e6, 0.0)}, "joint_stiffness is 0.0; give a positive number"),
-    ],
-)
-def test_a_wrong_value_is_a_line(wrong, said):
-    with pytest.raises(SceneError, match=re.escape(said)):
-        Arm(**ARM | wrong)
+WRONG = {
+    "urdf is 3; give the path of a URDF, or package:path": {"urdf": 3},
+    "tool_length is 0.0; give a positive number of m": {"tool_length": 0.0},
+    "give perpendicular unit vectors": {"x_axis": (1.0, 1.0, 0.0)},
+    "fingers stand out 0.3 m from a brick": {"fingers": 0.3},
+    "faces are ('top',); give some of length, width, thickness": {"faces": ("top",)},
+    "joint_stiffness is 0.0; give a positive number": {"joint_stiffness": (1e6, 0.0)},
+}
+NOWHERE = {
+    "there is no file nowhere.urdf; give a URDF, or package:path": "nowhere.urdf",
+    "package no_such_package is not installed": "no_such_package:robot.urdf",
+    "package seqopt has no file robot.urdf": "seqopt:robot.urdf",
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_a_wrong_value_is_a_line(said):
+    with one_line(SceneError, re.escape(said)):
+        Arm(**ARM | WRONG[said])
+
+
+@pytest.mark.parametrize("said", NOWHERE)
+def test_a_model_that_is_not_there_is_named(said):
+    with one_line(SceneError, re.escape(said)):
+        model_path(Arm(**ARM | {"urdf": NOWHERE[said]}))
 
 
 def test_a_scene_with_arms_comes_back_from_its_file(tmp_path):
@@ -75,19 +87,6 @@ def test_without_the_extra_it_is_named(monkeypatch):
     with pytest.raises(ExtraError, match=re.escape("pip install 'seqopt[arms]'")):
         find_postures(two_arms(tool_radius=0.049))
     assert find_postures(seqopt.load_scene("arch25")) is None
-
-
-@pytest.mark.parametrize(
-    ("urdf", "said"),
-    [
-        ("nowhere.urdf", "there is no file nowhere.urdf; give a URDF, or package:path"),
-        ("no_such_package:robot.urdf", "package no_such_package is not installed"),
-        ("seqopt:robot.urdf", "package seqopt has no file robot.urdf"),
-    ],
-)
-def test_a_model_that_is_not_there_is_named(urdf, said):
-    with pytest.raises(SceneError, match=re.escape(said)):
-        model_path(Arm(**TOOL | {"urdf": urdf, "position": (0.0, 0.0, 0.0)}))
 
 
 # arms whose joints give way: the posture that is kept, plans of them, and who checks which

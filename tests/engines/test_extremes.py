@@ -275,16 +275,6 @@ def test_a_brick_is_not_stretched(engine25):
     assert not one.edge_force[0, edge].any()
 
 
-def test_a_hand_that_takes_all_force_away(engine25):
-    """Moved where the node goes by itself, a grip bears nothing: forces undo no displacements."""
-    net = engine25.network
-    free = engine25.solve(9, np.zeros((1, 0), dtype=int), Want.ALL)
-    node = net.node_name.index(13)
-    found = engine25.solve(9, [[13]], Want.ALL, free.displacement[:, [node]])
-    assert np.abs(found.grip_force).max() <= 1e-8
-    assert np.abs(found.displacement - free.displacement).max() <= 1e-12
-
-
 def test_diagnosis_asks_where_hands_are(engine25):
     moved = drawn([3, 20, 33], 4e-4)
     found = diagnose(engine25, 18, [3, 20, 33], moved)

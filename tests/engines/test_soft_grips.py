@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.network import build_network
 from tests.arms.scenes import compliances, with_joints
-from tests.builders import apart, block, six_bricks
+from tests.builders import apart, six_bricks
 from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
@@ -228,18 +228,6 @@ def test_two_on_one_brick_share_by_their_stiffness(arch25):
         assert force == pytest.approx(sure.grip_force[0], rel=1e-9, abs=1e-7)
 
 
-def test_moving_two_apart_pulls_at_both(arch25):
-    """What a rigid pair ignores stretches the springs of a soft one: k/2 times the way."""
-    net = build_network(arch25.with_grips(1e6))
-    axis = net.edge_axis[np.flatnonzero((net.edge_spring < 0) & (net.edge_brick == 11))[0]]
-    moved = np.zeros((1, 2, 3))
-    moved[0, 1] = 1e-4 * axis
-    engine = ComplianceEngine(net)
-    still, pulled = (engine.solve(18, [[22, 23]], Want.ALL, m).grip_force[0] for m in (None, moved))
-    shared = np.diff((pulled - still) @ axis)
-    assert shared == pytest.approx([1e6 * 1e-4], rel=1e-9)
-
-
 # what is asked, and refused
 def test_turning_is_a_hold_of_its_own():
     """One grip that lets nothing turn holds a brick that two others leave turning."""
@@ -299,24 +287,6 @@ def test_engines_agree_with_joints(grips, turn):
         found = make_engine(name, net).solve(6, numbers, Want.ALL)
         assert far(found.grip_force[0], borne[:, :3]) <= close
         assert far(found.displacement[0, inner_nodes(net, 6)], shifts) <= close
-
-
-@pytest.mark.parametrize("size", [1e3, 1e5])
-def test_one_joint_bears_what_a_lever_on_a_spring_does(size):
-    """A hinge whose axis is level, 1.5 m from the node, beside ground that sinks and does not turn.
-
-    Where node and ground sink by the same u, W = u (g + k / L²), with g of the ground.
-    """
-    ground, length = 1e6, 1.5
-    hinge = np.zeros((1, 2, 6, 1))
-    hinge[..., 2, 0], hinge[..., 4, 0] = length, 1.0  # it turns about y, and lifts
-    lever, ways = size / length**2, (("compliance", 1e13), ("frame", 1e8), ("discrete", 1e8))
-    for name, turning in ways:
-        scene = block(translational_stiffness=(ground,) * 3, rotational_stiffness=(turning,) * 3)
-        arm, weight = with_joints(scene, [[size]], hinge), scene.bricks[0].mass * 9.81
-        node, close = scene.bricks[0].nodes[0], 1e-7 if name == "compliance" else 1e-3
-        found = make_engine(name, arm).solve(1, [[node]], Want.ALL).grip_force[0, 0]
-        assert found[2] == pytest.approx(weight * lever / (ground + lever), abs=close * weight)
 
 
 def test_a_posture_that_there_is_not_is_a_line(arch25):

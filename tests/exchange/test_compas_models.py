@@ -26,6 +26,7 @@ from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, element, matrix, model, nested, obj
+from tests.refusals import one_line
 
 LYING = matrix([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]])
 # of `nested`, as ``modelgeometry.aabb()`` of compas_model 0.9.3 gives them: lowest and highest
@@ -87,17 +88,15 @@ def test_transformations_are_composed_from_the_model_down(drawn):
         np.testing.assert_allclose(block.vertices, local @ at[:3, :3].T + at[:3, 3], atol=1e-12)
 
 
-def turned(**more):
+def turned():
     document = model()
-    document["data"] |= {"transformation": LYING, **more}
+    document["data"] |= {"transformation": LYING}
     return document
 
 
-def test_faces_follow_blocks_that_compas_moved(tmp_path):
+def test_faces_follow_blocks_that_compas_moved(read):
     """COMPAS moves the blocks of a model, and leaves the contacts where it found them."""
-    path = tmp_path / "lying.json"
-    path.write_text(json.dumps(turned()), encoding="utf-8")
-    lying = import_scene(path, given=Given(unit="m"))
+    lying = read("lying.json", turned(), Given(unit="m"))
     assert [round(brick.position[1], 9) for brick in lying.placed] == [-0.75, -1.25]
     assert [round(spring.position[1], 9) for spring in (*lying.grounds, *lying.joints)] == [
         -0.5,
@@ -266,67 +265,57 @@ def test_what_can_be_mended_is_mended_and_said(read):
     assert scene.bricks[0].mass == pytest.approx(2400.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "given", "said"),
-    [
-        ("a.json", DOCUMENTS["assembly"], Given(density=1.0), "does not say its unit of length"),
-        ("a.json", DOCUMENTS["assembly"], Given(unit="m"), "block 4 has no density; give one"),
-        ("a.json", DOCUMENTS["assembly"], Given(unit="m", density=1.0, robots=0), "robots is 0"),
-        (
-            "a.json",
-            DOCUMENTS["assembly"],
-            Given(unit="m", density=1.0, supports=["5"]),
-            "there is no block '5'; known are '0, 4, 7'",
-        ),
-        (
-            "a.json",
-            DOCUMENTS["assembly"],
-            Given(unit="m", density=1.0, supports=["0", "4", "7"]),
-            "all blocks are supports",
-        ),
-        ("a.json", DOCUMENTS["assembly"], Given(unit="m", density=1.0, gap=0.0), "gap is 0"),
-        ("a.obj", obj(LOW, box((1, 1, 1), at=(0, 0, 5))), METERS, "1 blocks touch nothing"),
-        ("a.obj", "v 0 0 0\n", METERS, "it has no faces"),
-        ("a.obj", "v 0 0 0\nf 1 2 3\n", METERS, "line 2: there is no vertex '2'; 1 stand before"),
-        ("a.obj", obj(LOW).replace("f 4//1 3//1 2//1 1//1\n", ""), METERS, "one side only; close"),
-        ("a.stl", b"solid x\nfacet", METERS, "a .stl cannot be read; open it in Rhino or Blender"),
-        ("a.csv", BOXES.replace("yaw", "angle"), METERS, "column 'angle' is not known"),
-        ("a.csv", BOXES.replace(".75,", "nan,", 1), METERS, "row 2: x is 'nan'; give a number"),
-        ("a.csv", BOXES + "0,0,9,1,1,1,90,1,1,1,1,1,1,1\n", METERS, "more cells than the"),
-        ("a.csv", TWINS, METERS, "block a1 occurs twice; give each its own name"),
-        ("a.csv", MASSES.replace("2.4", "-2.4"), METERS, "row 1: mass is -2.4; give a positive nu"),
-        (
-            "a.csv",
-            MASSES.replace("mass", "mass,density").replace("2.4", "2.4,1800"),
-            METERS,
-            "block 1: its mass of 2.4 kg is 2000 kg/m³ in 0.0012 m³, its density 1800 kg/m³; give",
-        ),
-        ("a.xyz", "0 0 0\n", METERS, "its format is not known; give one of compas_assembly"),
-        (
-            "a.dxf",
-            "0\nSECTION\n",
-            METERS,
-            "a .dxf cannot be read; open it in Rhino or FreeCAD, and export closed meshes",
-        ),
-        ("a.json", "{", METERS, "not JSON, line 1"),
-        ("a.json", '{"node": NaN}', METERS, "NaN stands where a number should"),
-        ("a.json", {"format": "seqopt-scene"}, METERS, "a scene of seqopt already"),
-        ("a.json", {"unit": "meter", "nodes": []}, METERS, "no assembly that is known"),
-        ("a.json", {"dtype": "compas.scene/Scene", "data": {}}, METERS, "a scene cannot be read"),
-        ("a.json", {"node": {"0": {"block": None}}}, METERS, "block 0 is None"),
-        (
-            "a.json",
-            [{"vertices": [[0, 0, 1e300]] * 4, "faces": []}],
-            METERS,
-            "a finite number up to 1e",
-        ),
-        ("a.json", [{"vertex": {}, "face": {"0": [1]}}], METERS, "there is no vertex 1"),
-    ],
-)
-def test_what_a_file_lacks_or_has_wrong_is_one_line(read, name, content, given, said):
-    with pytest.raises(SceneError, match=said.replace("(", r"\(")) as caught:
-        read(name, content, given)
-    assert "\n" not in str(caught.value)
+LACKING = {  # what the assembly is given: what is said
+    "does not say its unit of length": {"unit": None},
+    "block 4 has no density; give one": {"density": None},
+    "robots is 0": {"robots": 0},
+    "there is no block '5'; known are '0, 4, 7'": {"supports": ["5"]},
+    "all blocks are supports": {"supports": ["0", "4", "7"]},
+    "gap is 0": {"gap": 0.0},
+}
+
+
+@pytest.mark.parametrize("said", LACKING)
+def test_what_an_assembly_lacks_is_one_line(read, said):
+    with one_line(SceneError, said):
+        read("a.json", DOCUMENTS["assembly"], replace(METERS, **LACKING[said]))
+
+
+WRONG = {  # what is said: a file and what is in it
+    "1 blocks touch nothing": ("a.obj", obj(LOW, box((1, 1, 1), at=(0, 0, 5)))),
+    "it has no faces": ("a.obj", "v 0 0 0\n"),
+    "line 2: there is no vertex '2'; 1 stand before": ("a.obj", "v 0 0 0\nf 1 2 3\n"),
+    "one side only; close": ("a.obj", obj(LOW).replace("f 4//1 3//1 2//1 1//1\n", "")),
+    "a .stl cannot be read; open it in Rhino or Blender": ("a.stl", b"solid x\nfacet"),
+    "column 'angle' is not known": ("a.csv", BOXES.replace("yaw", "angle")),
+    "row 2: x is 'nan'; give a number": ("a.csv", BOXES.replace(".75,", "nan,", 1)),
+    "more cells than the": ("a.csv", BOXES + "0,0,9,1,1,1,90,1,1,1,1,1,1,1\n"),
+    "block a1 occurs twice; give each its own name": ("a.csv", TWINS),
+    "row 1: mass is -2.4; give a positive nu": ("a.csv", MASSES.replace("2.4", "-2.4")),
+    "block 1: its mass of 2.4 kg is 2000 kg/m³ in 0.0012 m³, its density 1800 kg/m³; give": (
+        "a.csv",
+        MASSES.replace("mass", "mass,density").replace("2.4", "2.4,1800"),
+    ),
+    "its format is not known; give one of compas_assembly": ("a.xyz", "0 0 0\n"),
+    "a .dxf cannot be read; open it in Rhino or FreeCAD, and export closed meshes": (
+        "a.dxf",
+        "0\nSECTION\n",
+    ),
+    "not JSON, line 1": ("a.json", "{"),
+    "NaN stands where a number should": ("a.json", '{"node": NaN}'),
+    "a scene of seqopt already": ("a.json", {"format": "seqopt-scene"}),
+    "no assembly that is known": ("a.json", {"unit": "meter", "nodes": []}),
+    "a scene cannot be read": ("a.json", {"dtype": "compas.scene/Scene", "data": {}}),
+    "block 0 is None": ("a.json", {"node": {"0": {"block": None}}}),
+    "a finite number up to 1e": ("a.json", [{"vertices": [[0, 0, 1e300]] * 4, "faces": []}]),
+    "there is no vertex 1": ("a.json", [{"vertex": {}, "face": {"0": [1]}}]),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_a_file_has_wrong_is_one_line(read, said):
+    with one_line(SceneError, said) as caught:
+        read(*WRONG[said])
     assert len(str(caught.value)) < 600
 
 
@@ -512,13 +501,11 @@ def test_blocks_that_share_a_vertex_alone_are_two():
     assert len(keys(text)) == 2
 
 
-def test_what_is_open_is_said_to_be_open(tmp_path):
+def test_what_is_open_is_said_to_be_open(read):
     """Also where every face has vertices of its own, so that none says what belongs together."""
-    path = tmp_path / "open.obj"
-    path.write_text(loose().rsplit("f ", 1)[0], encoding="utf-8")
     last = len(SHAPES) - 1
     with pytest.raises(SceneError, match=f"block {last}: shape: edge .* close the shape"):
-        import_scene(path, given=Given(unit="m", density=2000.0))
+        read("open.obj", loose().rsplit("f ", 1)[0])
 
 
 def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
@@ -540,36 +527,25 @@ def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
     assert load_scene(out).grounds == scene.grounds
 
 
-GIVEN = Given(unit="m", density=2000.0)
 TOWER = [box((0.4, 0.2, 0.1), at=(0.0, 0.0, 0.1 * i)) for i in range(3)]
 
 
-@pytest.fixture
-def imported(tmp_path):
-    def of(text):
-        path = tmp_path / "tower.obj"
-        path.write_text(text, encoding="utf-8")
-        return import_scene(path, given=GIVEN)
-
-    return of
-
-
-def test_faces_without_area_are_no_blocks(imported):
+def test_faces_without_area_are_no_blocks(read):
     """As programs write them that cut every face into triangles."""
-    assert len(imported(obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
+    assert len(read("tower.obj", obj(*TOWER) + "f 4 4 8\nf 4 8 8\n").bricks) == len(TOWER)
 
 
-def test_faces_inside_a_block_are_named(imported):
+def test_faces_inside_a_block_are_named(read):
     """A wall across an L, between edges of which each has two faces without it."""
     shape, corners = prism(L_SHAPE, 0.1, at=(0.0, 0.0, 0.1)), len(L_SHAPE)
     wall = f"f 1 4 {4 + corners} {1 + corners}\n"
     with pytest.raises(SceneError, match=r"block 0: .* 2 of its edges have more than two faces"):
-        imported(obj(shape).replace("o block_0\n", "").replace("f ", f"{wall}f ", 1))
+        read("tower.obj", obj(shape).replace("o block_0\n", "").replace("f ", f"{wall}f ", 1))
 
 
-def test_an_object_of_several_blocks_is_said(imported):
+def test_an_object_of_several_blocks_is_said(read):
     cubes = [box((0.2, 0.2, 0.1), at=(x, 0, 0)) for x in (0.0, 0.3)]
-    said = imported(obj(*cubes).replace("o block_1\n", "")).provenance
+    said = read("tower.obj", obj(*cubes).replace("o block_1\n", "")).provenance
     assert "2 closed pieces are called block_0: each is a block of its own" in said
 
 

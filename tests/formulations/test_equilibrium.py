@@ -30,7 +30,7 @@ from seqopt.plan._infeasible import Look
 from seqopt.problem.criteria import WorstRatio
 from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case, Claim, Prover, Sense, limits
-from seqopt.stability.standing import NARROW, Standing, _without_implied, slack
+from seqopt.stability.standing import NARROW, Standing, StandingSets, slack
 from seqopt.stability.verdict import Verdict
 from tests.brute_force import ONES as FOUR_ONES
 from tests.brute_force import allowed, least_peak, peaks, whole_graph
@@ -357,7 +357,8 @@ def test_a_margin_is_that_of_the_worst_step_to_two_percent(aim, way):
 def test_demands_that_others_imply_are_not_asked():
     weak, strong = Standing("bond=3e3"), Standing("dry")
     tilted = Standing("bond=1e3", 0.1)
-    assert _without_implied((weak, strong, tilted, weak)) == (strong, tilted)
+    network, every = seqopt.build_network(small_arch(4)), (weak, strong, tilted, weak)
+    assert StandingSets(network, weak, np.ones(1), every)._demands == (strong, tilted)
 
 
 @slow

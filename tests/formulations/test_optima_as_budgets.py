@@ -35,7 +35,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.sequence.methods import modified_sequential
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES, least_peak, peaks, whole_graph
-from tests.builders import small_arch
+from tests.builders import Clock, small_arch
 from tests.strategies import free_builds
 from tests.times.builders import engine_of
 
@@ -255,16 +255,6 @@ def test_where_memory_ends_there_is_a_bound(arch):
                 seqopt.solve(problem, "schedule_search", **words)
 
 
-class Clock:
-    """A clock that moves on by a million seconds whenever it is looked at."""
-
-    now = 0.0
-
-    def perf_counter(self):
-        self.now += 1e6
-        return self.now
-
-
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
@@ -276,9 +266,7 @@ def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, sai
     """What is known by then is said."""
     engine = seqopt.make_engine("compliance", small_arch(5))
     problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
-    clock = Clock()
-    for module in ("_infeasible",):
-        monkeypatch.setattr(f"seqopt.plan.{module}.time", clock)
+    monkeypatch.setattr("seqopt.plan._infeasible.time", Clock(1e6))
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
 

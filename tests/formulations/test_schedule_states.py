@@ -249,7 +249,7 @@ def test_a_search_that_ends_early_keeps_its_plan_and_a_bound_that_is_a_number():
                 raise StopError("time")
 
         with suppress(TimeUpError):
-            found.append(search_states(problem, Options(2, 1.1, dear=False), tell))
+            found.append(search_states(problem, Options(2, 1.1, expensive=False), tell))
     assert {each.stopped for each in found} == {"", "time"}
     best = min(each.objective for each in found)
     assert all(each.bound[0] <= best[0] <= each.objective[0] for each in found)  # NaN is not

@@ -17,7 +17,7 @@ from seqopt.graph._budgets import Plane, Polyhedron, highest_bound, is_beyond, w
 from seqopt.graph.graph import _sum_bound, distances, lexicographic_bounds, reached
 from seqopt.graph.space import Moves, Space
 from seqopt.judge.arithmetic import budget_bounds
-from tests.layered import Budget, Costs
+from tests.layered import Costs
 from tests.random_graphs import graphs, simple_paths, values_of
 
 INF = np.inf
@@ -79,24 +79,6 @@ def test_the_move_that_ends_every_choice_is_named(part, move, value, named):
 def test_a_move_without_candidates_is_named():
     with pytest.raises(ProblemError, match="move 1 has no candidates"):
         changed("single", 0, np.zeros(0))
-
-
-def use(bound):
-    """A budget of which the candidates of two moves take 3 and -5, 0 and 4."""
-    return Budget(
-        "use",
-        (np.array([3.0, -5.0]), np.array([0.0, 4.0])),
-        (np.zeros((1, 2)), np.array([[0.0, 1.0], [0.0, 1.0]])),
-        bound,
-    )
-
-
-@pytest.mark.parametrize(("choice", "taken"), [((0, 0), 3.0), ((1, 1), 0.0), ((0, 1), 8.0)])
-def test_what_a_choice_takes_of_a_budget(choice, taken):
-    """With what the pair takes; amounts that cancel do."""
-    budget = use(12.0)
-    assert budget.spent(choice) == taken
-    assert budget.spent(choice) == LayeredCosts(budget.single, budget.shared).cost(choice)
 
 
 # paths, bounds, multipliers and visits of an explorer against brute force and other solvers

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt._registry import ADDED
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.graph.formulation import LabelProof, find_formulation
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.graph import Graph, lexicographic
 from seqopt.graph.states import build_states
 from seqopt.judge._schedules import judge_schedule
 from seqopt.plan.front import FrontProblem, find_front
-from seqopt.problem import Amount
 from seqopt.problem.criteria import WorstRatio
 from seqopt.scene.scene import with_robots
 from seqopt.sequence.rules import FreeRules
@@ -51,15 +49,6 @@ def test_weights_of_scenarios_that_prove_little_leave_a_gap():
         judge_schedule(states, replace(found, objective=(0.9 * found.objective[0],)), plan.steps)
 
 
-def held(states):
-    return (states.nodes >= 0).sum(axis=1)
-
-
-@pytest.fixture
-def registered(monkeypatch):
-    monkeypatch.setitem(ADDED, (Amount, "held_alone"), Amount("held_alone", held))
-
-
 def basis(plan):
     named = {n: str(b) for n, b in zip(plan.goals, plan.certificate.rests_on, strict=False)}
     assert plan.summary()["bound_rests_on"] == named
@@ -72,12 +61,6 @@ def test_states_are_rebuilt_and_costs_of_instances_are_given():
     loop = seqopt.optimize(scene)
     assert basis(loop) == ["rebuilt"]
     assert basis(seqopt.solve(seqopt.compile_instance(loop.problem))) == ["given"]
-
-
-@pytest.mark.usefixtures("registered")
-def test_what_has_no_twin_is_claimed():
-    plan = seqopt.optimize("chain:bricks=7", "free", aim="minmax,held_alone")
-    assert basis(plan) == ["rebuilt", "claimed"]
 
 
 def test_without_a_proof_nothing_is_said():
@@ -289,17 +272,6 @@ def test_multipliers_and_weights_are_not_believed(space, share):
         return
     assert proof.values == own.values
     assert proof.bounds[0] <= own.values[0] * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("space", ["time", "instance: time"])
-def test_labels_that_are_left_out_are_missed(space):
-    def lie(found):
-        (proof,) = found.proofs
-        fewer = LabelProof(proof.states[1:], proof.labels[1:], proof.prices)
-        return replace(found, proofs=(fewer,))
-
-    with pytest.raises(SolverError, match="labels do not prove"):
-        told(space, lie)
 
 
 @cache

@@ -13,7 +13,6 @@ from hypothesis.strategies import integers
 from seqopt.network import network as networks
 from seqopt.network.network import PartKind, build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.schedule import islands
 from tests.builders import running_bond
 from tests.strategies import arches, walls
 
@@ -97,20 +96,6 @@ def test_a_wall_has_loops():
     assert len(nx.cycle_basis(graph)) > 0
     assert (np.bincount(net.edge_kind) > 0).all()
     assert net.node_kind[net.inner].max() == PartKind.INNER
-
-
-def test_springs_that_resist_tie_bodies(arch25):
-    assert islands(build_network(arch25), 24) == ()
-    loose = replace(
-        arch25,
-        joints=tuple(
-            replace(joint, translational_stiffness=(0.0,) * 3, rotational_stiffness=(0.0,) * 3)
-            if joint.bricks == (4, 5)
-            else joint
-            for joint in arch25.joints
-        ),
-    )
-    assert islands(build_network(loose), 6) == ({5, 6},)
 
 
 def test_a_grips_compliance_is_one_value(arch25):

@@ -93,7 +93,10 @@ def test_models_digits_and_responses_are_what_was_solved(records, aim):
         assert models["again"] > 0
     else:  # of ranks those that are solved again are counted once
         assert models["searched"] == len(six)
+    assert models["searched"] == plan.models
+    assert {*spent["responses"]["computed"]} <= {*spent["responses"]["asked"]}
     assert spent["responses"]["values"] == records.values
+    assert spent["verdicts"] == {"asked": 0, "programs": 0}
     assert models["answered"] == records.answered > models["searched"]
     assert models["needed"] == max(len(distinct(plan)), plan.certificate.models)
     assert models["corrected"] == records.corrected == 0

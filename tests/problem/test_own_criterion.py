@@ -1,7 +1,6 @@
 """Criteria people bring; what criteria take from a scene."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -9,18 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.layers import best_in_order
 from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.graph.states import build_states
 from seqopt.judge._proof import Proof
 from seqopt.problem.criteria import OVER_METHODS, RankSum, StepCost, WeightedSum, equal
-from seqopt.problem.problem import Aim
 from seqopt.responses.scales import NEVER, SceneFacts, crown
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.rules import FreeRules
 from seqopt.study import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import anywhere, far_reaching, rescaled, running_bond, six_bricks, small_arch
-from tests.strategies import arches, problems
+from tests.strategies import arches
 
 NAMES = ("F_largest", "M_sup")
 
@@ -111,38 +108,6 @@ def test_what_is_no_function_is_refused():
         StepCost("wrong", "T_max", weighed)
     with pytest.raises(ProblemError, match=r"criterion wrong: a state .* has no X_max; give C_max"):
         posed(StepCost("wrong", ("X_max",), weighed))
-
-
-# aims in their order
-def values(goals):
-    """What every allowed choice is worth, in the order of the aims."""
-    found = {}
-    for choice in product(*(range(size) for size in goals[0][0].sizes)):
-        worth = tuple(
-            (costs.cost if aim is Aim.SUM else costs.worst)(choice) for costs, aim in goals
-        )
-        if np.isfinite(worth).all():
-            found[choice] = worth
-    return found
-
-
-@given(problem=problems(), data=st.data())
-def test_aims_in_their_order_agree_with_brute_force(problem, data):
-    goals = [(problem.sums, data.draw(st.sampled_from(Aim)))]
-    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
-    for _ in range(data.draw(st.integers(0, 2))):
-        costs = replace(
-            problem.sums,
-            single=tuple(rng.integers(0, 3, s.shape) + 0.0 for s in problem.sums.single),
-            shared=tuple(rng.integers(0, 3, s.shape) + 0.0 for s in problem.sums.shared),
-        )
-        goals.append((costs, data.draw(st.sampled_from(Aim))))
-    found = values(goals)
-    if not found:
-        with pytest.raises(InfeasibleError, match="move"):
-            best_in_order(goals)
-        return
-    assert found[best_in_order(goals)] == min(found.values())
 
 
 # what criteria take from a scene: crown, units, scales; and that none of it is one arch's

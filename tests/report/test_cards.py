@@ -198,17 +198,6 @@ def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(
 SMALL = "chain:bricks=7"
 
 
-def test_no_response_is_computed_that_nobody_asks_for():
-    for schedule, aim in ((None, None), ("free", "minmax,steps"), ("free", "T_max")):
-        plan = seqopt.optimize(SMALL, schedule, aim=aim)
-        spent = plan.spent
-        assert {*spent["responses"]["computed"]} <= {*spent["responses"]["asked"]}
-        assert 0 <= spent["models"]["six_digits"] <= spent["models"]["searched"] == plan.models
-        assert spent["verdicts"] == {"asked": 0, "programs": 0}
-        assert spent["models"]["needed"] <= spent["models"]["answered"]
-    assert spent["responses"]["computed"] == ["T_max"]
-
-
 @pytest.mark.slow
 def test_verdicts_are_counted_once():
     plan = seqopt.optimize(SMALL, "free", aim="minmax,steps", stands="dry")

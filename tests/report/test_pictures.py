@@ -19,10 +19,9 @@ from seqopt.plan.build import GivenSequence
 from seqopt.report._gantt import gantt_picture
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
 from seqopt.report.comparison import compare
-from seqopt.report.draw import View, _drawing_order, draw_bricks, draw_grips, draw_network
+from seqopt.report.draw import View, _drawing_order, draw_bricks, draw_grips
 from seqopt.scene.boxes import _boxes, box_corners
 from seqopt.scene.library import WallShape, wall
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.methods import sequential
 from seqopt.sequence.schedule import holds
 from seqopt.study import EQUATIONS
@@ -162,14 +161,6 @@ def test_twists_move_bricks_and_magnify(axes, engine25):
     )
 
 
-def test_tension_and_compression_differ_in_color(axes, engine25):
-    force = engine25.solve(12, [[19]]).edge_force[0]
-    draw_network(axes, engine25.network, 12, View(), edge_force=force, numbers=True)
-    colors = axes.collections[0].get_colors()
-    assert len({tuple(color) for color in colors}) == 2
-    assert len(axes.collections[0].get_segments()) == engine25.network.count_edges(12)
-
-
 def test_blocks_of_any_shape_show_the_faces_that_look_at_the_viewer(axes):
     network = build_network(with_shapes(six_bricks()))
     draw_bricks(axes, network, 6, View(), twist=np.zeros((6, 6)), marked=(2,))
@@ -272,15 +263,6 @@ def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
     order = _drawing_order(box_corners(WALL.bricks), view.axes())
     assert sorted(order) == [*range(16)]
     assert hidden_wrongly(WALL, view, order, 80) == 0
-
-
-@pytest.mark.parametrize("name", ["arch25", "dome163"])
-def test_built_in_scenes_are_drawn_in_order(name):
-    scene, view = load_scene(name), View(35, 22)
-    order = _drawing_order(box_corners(scene.bricks), view.axes())
-    assert sorted(order) == [*range(len(scene.bricks))]
-    rays = 4000 if name == "arch25" else 400
-    assert hidden_wrongly(scene, view, order, rays) == 0
 
 
 def test_depth_of_the_middles_alone_draws_a_wall_wrongly():

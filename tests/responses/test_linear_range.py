@@ -19,27 +19,9 @@ from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.methods import cantilever, sequential
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.study import published_plan
-from tests.builders import from_both_sides, small_arch
+from tests.builders import from_both_sides, scaled, small_arch
 
 WORDS = "arch:span=3,rise=1.2,bricks=21,density=2000,dimensions=0.18x0.1x0.06"
-
-
-def changed(scene, stiffness=1.0, density=1.0, **joint):
-    """Return a scene with other joints and bricks."""
-
-    def spring(value):
-        both = {
-            name: tuple(stiffness * k for k in getattr(value, name))
-            for name in ("translational_stiffness", "rotational_stiffness")
-        }
-        return replace(value, **both, **joint)
-
-    return replace(
-        scene,
-        bricks=tuple(replace(brick, density=density * brick.density) for brick in scene.bricks),
-        joints=tuple(map(spring, scene.joints)),
-        grounds=tuple(map(spring, scene.grounds)),
-    )
 
 
 def found(scene, method=sequential, engine="compliance"):
@@ -61,14 +43,17 @@ def test_the_plans_of_the_reference_arch_are_within(arch25, engine):
 
 @pytest.mark.slow
 def test_every_limit_is_told_from_the_others(arch25):
-    moved = found(changed(arch25, stiffness=1 / 100))["displacement"]  # by half a brick
+    moved = found(scaled(arch25, stiffness=1 / 100))["displacement"]  # by half a brick
     assert moved.said == "30.59 mm, more than 5.3 mm, a tenth of the smallest side of a brick"
     assert 47 in moved.steps
     assert 1 not in moved.steps
-    assert {*found(changed(arch25, density=20.0))} == {"displacement", "stress in a joint"}
-    thin = changed(arch25, thickness=1e-7, face=None)
+    assert {*found(scaled(arch25, density=20.0))} == {"displacement", "stress in a joint"}
+    thin = replace(arch25, **{
+        part: tuple(replace(each, thickness=1e-7, face=None) for each in getattr(arch25, part))
+        for part in ("joints", "grounds")
+    })  # fmt: skip
     assert found(thin)["deformation of a joint"].said.endswith(f"more than {_STRAIN:g} times")
-    assert "rotation" in found(changed(arch25, stiffness=1 / 1000))
+    assert "rotation" in found(scaled(arch25, stiffness=1 / 1000))
 
 
 def test_bricks_that_turn_about_their_own_axis_are_seen(arch25):
@@ -139,7 +124,7 @@ def test_at_the_limit_the_displaced_shape_changes_displacements_by_a_tenth(share
     engine = make_engine("compliance", build_network(scene))
     steps = sequential(engine.network)
     most = max(shift for shift, _ in reached(engine, steps))
-    loaded = changed(scene, density=share * limit / most)
+    loaded = scaled(scene, density=share * limit / most)
     engine = make_engine("compliance", build_network(loaded))
     changes = []
     for step, (shift, twist) in zip(steps, reached(engine, steps), strict=True):
@@ -191,13 +176,13 @@ def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, wo
 
 @pytest.fixture
 def small_soft(tmp_path):
-    save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
+    save_scene(scaled(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
     return str(tmp_path / "soft.json")
 
 
 @pytest.mark.parametrize("engine", ["auto", "discrete"])
 def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, engine):
-    heavy = changed(arch25, density=20.0)
+    heavy = scaled(arch25, density=20.0)
     made = make_engine(engine, build_network(heavy))
     table = analyze(made, sequential(made.network)[:3])
     table.loc[1, "D_max_1e-3mm"] = 6e3

@@ -28,7 +28,6 @@ from seqopt.plan.solve import graph_of, pose, solve
 from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.requirements import CHOICE_RESPONSES, Limit
 from seqopt.responses import _grip_sets as batches
-from seqopt.responses import _grip_sets as division
 from seqopt.responses._grip_sets import Block, Resources, answer, packed
 from seqopt.responses.quantities import RESPONSES, responses_of, robot_response
 from seqopt.responses.table import (
@@ -92,12 +91,12 @@ def blocks_of(schedule, most):
     ("name", "workers"), [pytest.param("compliance", 2, marks=pytest.mark.long), ("auto", 3)]
 )
 def test_results_are_the_same_whatever_the_workers(monkeypatch, loop25, name, workers):
-    monkeypatch.setattr(division, "BLOCK", 50)  # many blocks on a small scene
-    alone = make_engine(name, loop25.scene)
-    shared = make_engine(name, loop25.scene)
-    (one, expected), (other, found) = (
-        evaluated(alone, loop25), evaluated(shared, loop25, workers=workers)
-    )  # fmt: skip
+    """And whether all sets are one block or, on this small scene, many."""
+    found = []
+    for size, own in ((10**9, 1), (50, workers)):
+        monkeypatch.setattr(batches, "BLOCK", size)
+        found.append(evaluated(make_engine(name, loop25.scene), loop25, workers=own))
+    (one, expected), (other, found) = found
     require_alike(found, expected)
     assert one.models == other.models == 8642
 
@@ -418,22 +417,6 @@ def test_steps_without_an_open_grip_have_no_ranks(engine25, loop25):
 def test_unknown_responses_are_refused(engine25, loop25):
     with pytest.raises(ProblemError, match=r"criterion x: .* no F_rob9; give C_max, D_max"):
         pose(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
-
-
-@pytest.mark.slow
-def test_fields_are_asked_for_in_blocks(engine25, loop25, monkeypatch):
-    found = []
-    for size in (10**9, 100):
-        monkeypatch.setattr(batches, "BLOCK", size)
-        graph = graph_of(pose(engine25, loop25, EQUATIONS, limits=BEYOND))
-        states = {level: graph.space.candidates(level).states for level in open_levels(graph)}
-        found.append({k: graph.seen(k, rows).responses for k, rows in states.items()})
-        assert graph.models == 8642
-    whole, parts = found
-    for level, responses in whole.items():
-        for name, values in responses.items():
-            most = 1e-11 * np.nanmax(np.abs(values), initial=0.0)
-            assert parts[level][name] == pytest.approx(values, abs=most, nan_ok=True)
 
 
 # the table of grips says what the table of responses says, grip by grip

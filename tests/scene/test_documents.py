@@ -20,13 +20,17 @@ from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene, save_scene
 from tests.blocks import with_shapes
 from tests.builders import six_bricks, with_part
+from tests.refusals import one_line
 from tests.strategies import arches, flat_arches, scenes_with_all, walls
 
 TEXT = dump_scene(six_bricks())
 
 
-def changed(change):
-    document = json.loads(TEXT)
+SHAPED, ARCH = dump_scene(with_shapes(six_bricks())), dump_scene(load_scene("arch25"))
+
+
+def changed(change, text=TEXT):
+    document = json.loads(text)
     change(document)
     return json.dumps(document)
 
@@ -36,24 +40,88 @@ def renamed(document, name):
     document["joints"][0]["bricks"][0] = document["grounds"][0]["brick"] = name
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("[" * 100_000, "nested too deep"),
-        (TEXT.replace("2420.0", "9" * 5000), "too many digits"),
-        (changed(lambda d: d["bricks"][0].update(density=10**400)), "brick 1: density is 1000"),
-        (changed(lambda d: renamed(d, 10**400)), "brick: its name is 1000"),
-        (changed(lambda d: d["bricks"][1].update(nodes=[10**30, 3])), "brick 2: nodes is 1000"),
-        (changed(lambda d: d.update(name="\ud800")), "scene: its name is '.ud800'"),
-        (changed(lambda d: d.update(name="\x1b[2J")), "scene: its name is '.x1b.2J'"),
-        (TEXT[:-2] + ',"name":"other"}', "key 'name' stands twice in one object; keep one"),
-    ],
-)
-def test_one_line_says_what_is_wrong(text, named):
-    with pytest.raises(SceneError, match=named) as caught:
-        _parse_scene(text, "broken.json")
-    assert "\n" not in str(caught.value)
+def put(value, *path):
+    """The document of the reference arch with another entry at a path."""
+
+    def change(document):
+        for key in path[:-1]:
+            document = document[key]
+        document[path[-1]] = value
+
+    return changed(change, ARCH)
+
+
+def brick(key, value):
+    return put(value, "bricks", 3, key)
+
+
+def shape(change):
+    return changed(lambda d: change(d["bricks"][0]["shape"]), SHAPED)
+
+
+def face(change):
+    return changed(lambda d: change(d["joints"][0]), SHAPED)
+
+
+def robot(value, *keys):
+    return put(value, "robots", 0, *keys)
+
+
+AROUND = {"kind": "sphere", "center": [0, 0], "radius": 1}
+MISSING = changed(lambda d: d["bricks"][3].pop("density"), ARCH)
+WRONG = {  # what is said, and of which text
+    "nested too deep": "[" * 100_000,
+    "too many digits": TEXT.replace("2420.0", "9" * 5000),
+    "brick 1: density is 1000": changed(lambda d: d["bricks"][0].update(density=10**400)),
+    "brick: its name is 1000": changed(lambda d: renamed(d, 10**400)),
+    "brick 2: nodes is 1000": changed(lambda d: d["bricks"][1].update(nodes=[10**30, 3])),
+    "scene: its name is '.ud800'": changed(lambda d: d.update(name="\ud800")),
+    "scene: its name is '.x1b.2J'": changed(lambda d: d.update(name="\x1b[2J")),
+    "key 'name' stands twice in one object; keep one": TEXT[:-2] + ',"name":"other"}',
+    r"bricks\[0\]: shape: faces is missing": shape(lambda own: own.pop("faces")),
+    r"bricks\[0\]: shape: edge": shape(lambda own: own["faces"].pop()),
+    r"bricks\[0\]: shape: a face": shape(lambda own: own["faces"][0].append(10**30)),
+    "convex polygon": face(lambda own: own.update(face=[[0, 0], [1, 0], [2, 0]])),
+    "counterclockwise": face(lambda own: own["face"].reverse()),
+    "its shape extends": changed(lambda d: d["bricks"][0].update(dimensions=[9, 9, 9]), SHAPED),
+    r"bricks": put([], "bricks"),
+    "brick 4: density is -5; give a positive number": brick("density", -5),
+    "brick 4: density is nan": brick("density", float("nan")),
+    "brick 4: density is True; give a positive number": brick("density", value=True),
+    r"bricks\[3\]: density is missing": MISSING,
+    r"bricks\[3\]: 'densty' is not known \(did you mean density": brick("densty", 2000),
+    r"brick 4: position is \['0', '0', '0'\]; give three": brick("position", ["0", "0", "0"]),
+    r"bricks\[3\] is 7; give an object": put(7, "bricks", 3),
+    r"robots\[0\]: reach: kind is 'cube'; give one of": robot("cube", "reach", "kind"),
+    r"robots\[0\]: reach: center is \[0, 0\]; give three": robot(AROUND, "reach"),
+    "robot rob1: payload is 0; give a positive": robot(0, "payload"),
+    "provenance is 3; give a str": put(3, "provenance"),
+    "brick 4: length_axis.*unit": brick("length_axis", [0, 0, 2]),
+    "brick 3 occurs twice": brick("name", 3),
+    "brick 4: placing_node is 99": brick("placing_node", 99),
+    r"joint \(1, 2\)": put([float("nan"), 1, 1], "joints", 0, "rotational_stiffness"),
+    r"joint \(1, 77\): there is no brick 77": put([1, 77], "joints", 0, "bricks"),
+    "there is no brick 77": put(77, "grounds", 0, "brick"),
+    "build_order": put([1, 2], "build_order"),
+    "brick 4: placing_node 7 is blocked": put([7], "blocked_nodes"),
+    "broken.json: format is 'other'; give 'seqopt-scene'": put("other", "format"),
+    "version is 2; give 1": put(2, "version"),
+    r"scene broken\.json: not JSON": "{",
+    r"scene broken\.json": "[]",
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_one_line_says_what_is_wrong(said):
+    with one_line(SceneError, said) as caught:
+        _parse_scene(WRONG[said], "broken.json")
     assert len(str(caught.value)) < 400
+
+
+def test_a_joint_without_its_face_is_a_scene_whose_contacts_are_not_known():
+    scene = _parse_scene(face(lambda own: own.pop("face")))
+    with pytest.raises(SceneError, match="is not a box and the joint has no face"):
+        bare_assembly(build_network(scene), len(scene.bricks))
 
 
 def test_numbers_that_are_whole_are_names():
@@ -67,41 +135,6 @@ def test_a_mark_at_the_start_is_no_content(tmp_path):
     path = tmp_path / "scene.json"
     path.write_text(TEXT, encoding="utf-8-sig")
     assert load_scene(str(path)) == six_bricks()
-
-
-SHAPED = dump_scene(with_shapes(six_bricks()))
-
-
-def reshaped(change):
-    document = json.loads(SHAPED)
-    change(document)
-    return json.dumps(document)
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        (lambda d: d["bricks"][0]["shape"].pop("faces"), r"bricks\[0\]: shape: faces is missing"),
-        (lambda d: d["bricks"][0]["shape"]["faces"].pop(), r"bricks\[0\]: shape: edge"),
-        (
-            lambda d: d["bricks"][0]["shape"]["faces"][0].append(10**30),
-            r"bricks\[0\]: shape: a face",
-        ),
-        (lambda d: d["joints"][0].update(face=[[0, 0], [1, 0], [2, 0]]), "convex polygon"),
-        (lambda d: d["joints"][0]["face"].reverse(), "counterclockwise"),
-        (lambda d: d["joints"][0].pop("face"), ""),
-        (lambda d: d["bricks"][0].update(dimensions=[9, 9, 9]), "its shape extends"),
-    ],
-)
-def test_a_malformed_shape_gets_one_clear_line(change, named):
-    if not named:  # a joint without its face is a scene, but no contact follows from the shapes
-        scene = _parse_scene(reshaped(change))
-        with pytest.raises(SceneError, match="is not a box and the joint has no face"):
-            bare_assembly(build_network(scene), len(scene.bricks))
-        return
-    with pytest.raises(SceneError, match=named) as caught:
-        _parse_scene(reshaped(change), "broken.json")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.filterwarnings("ignore::seqopt.errors.SceneWarning")  # bricks in one place, say
@@ -140,75 +173,6 @@ def test_the_reference_arch(arch25):
     assert arch25.bricks[0].mass == pytest.approx(3.66, abs=0.005)
     assert [(r.name, r.payload) for r in arch25.robots] == [(f"rob{i}", 392.4) for i in (1, 2, 3)]
     assert "Bruun" in arch25.provenance
-
-
-def break_at(path, value):
-    """The document of arch25 with the entry at a path replaced, or removed if value is None."""
-    document = json.loads(dump_scene(load_scene("arch25")))
-    place = document
-    for key in path[:-1]:
-        place = place[key]
-    if value is None:
-        del place[path[-1]]
-    else:
-        place[path[-1]] = value
-    return json.dumps(document)
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "named"),
-    [
-        (("bricks",), [], r"bricks"),
-        (("bricks", 3, "density"), -5, r"brick 4: density is -5; give a positive number"),
-        (("bricks", 3, "density"), float("nan"), r"brick 4: density is nan"),
-        (("bricks", 3, "density"), True, r"brick 4: density is True; give a positive number"),
-        (("bricks", 3, "density"), None, r"bricks\[3\]: density is missing"),
-        (
-            ("bricks", 3, "densty"),
-            2000,
-            r"bricks\[3\]: 'densty' is not known \(did you mean density",
-        ),
-        (
-            ("bricks", 3, "position"),
-            ["0", "0", "0"],
-            r"brick 4: position is \['0', '0', '0'\]; give three",
-        ),
-        (("bricks", 3), 7, r"bricks\[3\] is 7; give an object"),
-        (
-            ("robots", 0, "reach", "kind"),
-            "cube",
-            r"robots\[0\]: reach: kind is 'cube'; give one of",
-        ),
-        (
-            ("robots", 0, "reach"),
-            {"kind": "sphere", "center": [0, 0], "radius": 1},
-            r"robots\[0\]: reach: center is \[0, 0\]; give three",
-        ),
-        (("provenance",), 3, r"provenance is 3; give a str"),
-        (("bricks", 3, "length_axis"), [0, 0, 2], r"brick 4: length_axis.*unit"),
-        (("bricks", 3, "name"), 3, r"brick 3 occurs twice"),
-        (("bricks", 3, "placing_node"), 99, r"brick 4: placing_node is 99"),
-        (("joints", 0, "rotational_stiffness"), [float("nan"), 1, 1], r"joint \(1, 2\)"),
-        (("joints", 0, "bricks"), [1, 77], r"joint \(1, 77\): there is no brick 77"),
-        (("grounds", 0, "brick"), 77, r"there is no brick 77"),
-        (("build_order",), [1, 2], r"build_order"),
-        (("blocked_nodes",), [7], r"brick 4: placing_node 7 is blocked"),
-        (("robots", 0, "payload"), 0, r"robot rob1: payload is 0; give a positive"),
-        (("format",), "other", r"broken.json: format is 'other'; give 'seqopt-scene'"),
-        (("version",), 2, r"version is 2; give 1"),
-    ],
-)
-def test_a_malformed_scene_gets_one_clear_line(path, value, named):
-    with pytest.raises(SceneError, match=named) as caught:
-        _parse_scene(break_at(path, value), "broken.json")
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 400
-
-
-@pytest.mark.parametrize("text", ["{", "[]"])
-def test_what_is_no_scene_is_refused(text):
-    with pytest.raises(SceneError, match=r"scene broken\.json"):
-        _parse_scene(text, "broken.json")
 
 
 def test_files(tmp_path, arch25):

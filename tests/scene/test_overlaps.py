@@ -1,6 +1,7 @@
 """Solids that interpenetrate, and how deep: boxes by arithmetic, others by a program of its own."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from seqopt.exchange._doubts import find_overlaps
 from seqopt.scene._checks import as_vectors
 from seqopt.scene.boxes import _separations, block_brick, overlapping, require_apart
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
+from tests.refusals import one_line
 
 BRICK = (0.2, 0.1, 0.06)
 TOLERATED = 0.003
@@ -225,44 +226,27 @@ def test_nodes_of_a_block_that_is_hollow_in_the_middle_lie_in_it():
 CUBE = box((1.0, 1.0, 1.0))
 
 
-@pytest.mark.parametrize(
-    ("vertices", "faces", "said"),
-    [
-        (CUBE.vertices, CUBE.faces[:-1], "face on one side only"),
-        (CUBE.vertices, (*CUBE.faces[:-1], CUBE.faces[-1][::-1]), "do not agree|one side only"),
-        (CUBE.vertices, tuple(face[::-1] for face in CUBE.faces), "volume is -1"),
-        (((0, 0, 0.5), *CUBE.vertices[1:]), CUBE.faces, "not flat"),
-        (CUBE.vertices, (*CUBE.faces[:-1], (0, 1, 99, 4)), "name vertices from 0 to 7"),
-        (CUBE.vertices, ((0, 1, 1), *CUBE.faces[1:]), "three vertices or more"),
-        (CUBE.vertices, ((0.5, 1, 2), *CUBE.faces[1:]), "whole number"),
-    ],
-)
-def test_what_is_no_polyhedron_is_refused(vertices, faces, said):
-    with pytest.raises(SceneError, match=said) as caught:
-        Polyhedron(vertices, faces)
-    assert "\n" not in str(caught.value)
+FACES, BLOCK = CUBE.faces, block_brick(1, CUBE, 2000.0)
+made = partial(block_brick, density=2000.0)
+WRONG = {  # what is said, and what it is said of
+    "face on one side only": lambda: replace(CUBE, faces=FACES[:-1]),
+    "do not agree|one side only": lambda: replace(CUBE, faces=(*FACES[:-1], FACES[-1][::-1])),
+    "volume is -1": lambda: replace(CUBE, faces=tuple(face[::-1] for face in FACES)),
+    "not flat": lambda: replace(CUBE, vertices=((0, 0, 0.5), *CUBE.vertices[1:])),
+    "name vertices from 0 to 7": lambda: replace(CUBE, faces=(*FACES[:-1], (0, 1, 99, 4))),
+    "three vertices or more": lambda: replace(CUBE, faces=((0, 1, 1), *FACES[1:])),
+    "whole number": lambda: replace(CUBE, faces=((0.5, 1, 2), *FACES[1:])),
+    "brick 1: shape is 'box'; give a Polyhedron": lambda: made(1, "box"),
+    "its name is 'a'; give a whole number": lambda: made("a", CUBE),
+    r"nodes are \[1\]; give two different numbers": lambda: made(1, CUBE, nodes=(1,)),
+    "centroid of its shape is": lambda: replace(BLOCK, shape=CUBE),
+    "its shape extends": lambda: replace(BLOCK, dimensions=(1.0, 1.0, 2.0)),
+    "shape is 3; give a Polyhedron": lambda: replace(BLOCK, shape=3),
+    "two different points": lambda: replace(BLOCK, node_offsets=((0, 0, 0), (0, 0, 0))),
+}
 
 
-@pytest.mark.parametrize(
-    ("name", "shape", "more", "said"),
-    [
-        (1, "box", {}, "brick 1: shape is 'box'; give a Polyhedron"),
-        ("a", CUBE, {}, "its name is 'a'; give a whole number"),
-        (1, CUBE, {"nodes": (1,)}, r"nodes are \[1\]; give two different numbers"),
-    ],
-)
-def test_what_makes_no_brick_is_one_line(name, shape, more, said):
-    with pytest.raises(SceneError, match=said):
-        block_brick(name, shape, 2000.0, **more)
-
-
-def test_a_brick_and_its_shape_agree():
-    brick = block_brick(1, CUBE, 2000.0)
-    with pytest.raises(SceneError, match="centroid of its shape is"):
-        replace(brick, shape=CUBE)
-    with pytest.raises(SceneError, match="its shape extends"):
-        replace(brick, dimensions=(1.0, 1.0, 2.0))
-    with pytest.raises(SceneError, match="shape is 3; give a Polyhedron"):
-        replace(brick, shape=3)
-    with pytest.raises(SceneError, match="two different points"):
-        replace(brick, node_offsets=((0, 0, 0), (0, 0, 0)))
+@pytest.mark.parametrize("said", WRONG)
+def test_what_is_no_polyhedron_or_no_brick_of_it_is_refused(said):
+    with one_line(SceneError, said):
+        WRONG[said]()

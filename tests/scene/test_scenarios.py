@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from seqopt import Prop
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning, StepError
 from seqopt.exchange.imports import as_built, read_measured
+from seqopt.network.network import build_network
 from seqopt.report.page import Build, report_page
 from seqopt.scene import Load, load_scene
 from seqopt.scene.library.wall import WallShape, wall
@@ -21,7 +23,8 @@ from seqopt.scene.scenarios import scenarios
 from seqopt.scene.scene import _from_all_ends, _parse_order, in_order
 from seqopt.scene.scene_file import save_scene, scene_to_dict
 from seqopt.sequence.schedule import islands
-from tests.builders import six_bricks, small_arch
+from tests.builders import six_bricks, small_arch, with_part
+from tests.refusals import one_line
 from tests.strategies import arches
 
 
@@ -96,23 +99,6 @@ def test_draws_spread_as_they_are_said_to():
         assert draws.std() == pytest.approx(1 / math.sqrt(3), rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("given", "match"),
-    [
-        ({"stiffness": (3, 1)}, "stiffness is"),
-        ({"stiffness": 3.0}, "stiffness is 3.0; give the least and the largest factor"),
-        ({"density": 1.0}, "density is 1.0; give a number from 0 to below 1"),
-        ({"position": math.nan}, "position is nan; give a number from 0"),
-        ({"position": 1e20}, "scenario 1 of .* is not a valid scene"),
-        ({"count": 0}, "count is 0; give a whole number from 1"),
-        ({"seed": -1}, "seed is"),
-    ],
-)
-def test_numbers_that_cannot_be_meant(given, match):
-    with pytest.raises(SceneError, match=match):
-        scenarios(six_bricks(), **given)
-
-
 def test_grips_vary_by_kind_and_leave_all_else():
     """Rigid ones stay rigid, equally stiff ones equally stiff."""
     scene = six_bricks()
@@ -134,8 +120,6 @@ def test_grips_vary_by_kind_and_leave_all_else():
     assert 2.5 < max(ratios) <= 4.0
     assert drawn.settings["grips"] == [0.5, 4.0]
     assert "grips times 0.5 to 4, seed 1" in repr(drawn)
-    with pytest.raises(SceneError, match="grips is 3; give the least and the largest"):
-        scenarios(scene, grips=3)
 
 
 # bricks that stand where they were measured
@@ -162,10 +146,6 @@ def test_what_was_measured_moves_with_half_of_its_joints(steps):
 
 
 def test_what_was_measured_wrong_is_named(tmp_path):
-    with pytest.raises(SceneError, match="has no such brick"):
-        as_built(SCENE, {99: (0.0, 0.0, 0.0)})
-    with pytest.raises(SceneError, match="from where it was planned"):
-        as_built(SCENE, measured_at({1: (5.0, 0.0, 0.0)}))
     path = tmp_path / "built.csv"
     for text, said in (
         ("brick,x,y\n1,0,0\n", "give a CSV file with columns"),
@@ -195,43 +175,6 @@ def loaded():
     )
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"loads": (Load(brick=9, force=(0, 0, 1)),)}, "load on brick 9: there is no brick 9"),
-        ({"loads": (Load(brick=1, force=(0, 0, 1), since=8),)}, "there is no brick 8"),
-        (
-            {"loads": (Load(brick=1, force=(0, 0, 1), position=(0, 0, 1e10)),)},
-            "load on brick 1: position is .*; move it to its brick",
-        ),
-        ({"wind": (1e7, 0.0, 0.0)}, "wind is .*; give shares of the weight"),
-        ({"weight_factor": 1e150}, "brick 1: it weighs .*; correct its density"),
-        (
-            {"grounds": (replace(six_bricks().grounds[0], movement=(0, 0, 1e30)),)},
-            "ground end of brick 1: movement is .*; move it to its bricks",
-        ),
-    ],
-)
-def test_what_cannot_be_meant_is_refused(change, message):
-    with pytest.raises(SceneError, match=message):
-        replace(six_bricks(), **change)
-
-
-@pytest.mark.parametrize(
-    ("movement", "message"),
-    [
-        ((0, 0), "movement is .*; give three or six numbers"),
-        ((0, 0, np.nan), "movement is .*; give three finite numbers"),
-        (0.1, "movement is 0.1; give three or six numbers"),
-    ],
-)
-def test_a_movement_that_is_none_is_refused(movement, message):
-    with pytest.raises(SceneError, match=f"ground end of brick 1: {message}"):
-        replace(six_bricks().grounds[0], movement=movement)
-    with pytest.raises(SceneError, match="give three finite numbers"):
-        Load(brick=1, force=(0, 0, np.inf))
-
-
 def test_a_load_far_from_its_brick_is_doubted(tmp_path):
     far = replace(six_bricks(), loads=(Load(brick=1, force=(0, 0, -1), position=(0, 0, 9.0)),))
     save_scene(far, tmp_path / "own.json")
@@ -251,10 +194,10 @@ def test_scenarios_take_loads_along():
 
 def test_what_acts_depends_on_what_stands():
     scene = loaded()
-    network = seqopt.build_network(replace(scene, wind=(0.0, 0.0, 0.0)))
+    network = build_network(replace(scene, wind=(0.0, 0.0, 0.0)))
     acting = [np.flatnonzero(network.applied(b).any(axis=1)).tolist() for b in range(1, 7)]
     assert acting == [[], [1], [1], [1], [1], [1, 2]]
-    backward = seqopt.build_network(scene.with_robots(*scene.robots), "reversed")
+    backward = build_network(scene.with_robots(*scene.robots), "reversed")
     assert np.flatnonzero(backward.loads[1]).size == 8
     assert backward.loads[1][:2].tolist() == [5, 4]
     assert network.applied(6, before=5)[:, 2].tolist() == [0, 0, -5, 0, 0, 0]
@@ -278,33 +221,6 @@ def test_it_is_told(tmp_path, capsys):
 
 
 # props as parts of scenes: what they take, where they stand, and what files say of them
-@pytest.mark.parametrize(
-    ("props", "said"),
-    [
-        ([{"node": 99}], "prop at node 99: there is no free node 99; known are"),
-        ([{"node": 3}, {"node": 3}], "a prop at node 3 occurs twice; give each its own"),
-        ([{"node": 0}], "prop at node 0: there is no free node 0"),  # it is blocked
-    ],
-)
-def test_props_that_do_not_fit_a_scene(props, said):
-    with pytest.raises(SceneError, match=said):
-        load_scene("arch25").with_props(*(Prop(**each) for each in props))
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ({"node": 0.5}, "prop: node is 0.5; give a whole number"),
-        ({"node": 3, "direction": (0, 0, 0)}, "direction is .* give one that is not zero"),
-        ({"node": 3, "stiffness": -1}, "prop at node 3: stiffness is -1; give one number or three"),
-    ],
-)
-def test_wrong_props_get_one_line(words, said):
-    with pytest.raises(SceneError, match=said) as caught:
-        Prop(**words)
-    assert "\n" not in str(caught.value)
-
-
 def test_props_stand_from_their_bricks_until_the_whole_is_let_go():
     scene = small_arch(5)
     nodes = [scene.placed[k].nodes[0] for k in (3, 1)]
@@ -339,33 +255,16 @@ def test_orders_by_name():
     assert _parse_order(scene, "ends") == (1, 5, 2, 4, 3)
     assert _parse_order(scene, "1..2, 5..4,3") == (1, 2, 5, 4, 3)
     assert in_order(scene, None) is scene
-    network = seqopt.build_network(scene, (2, 1, 3, 4, 5))
+    network = build_network(scene, (2, 1, 3, 4, 5))
     assert network.scene.build_order == (2, 1, 3, 4, 5)
     assert [len(islands(network, count)) for count in (1, 2)] == [1, 0]
 
 
 def test_from_all_ends_leaves_nothing_that_hangs():
     scene = wall(WallShape(courses=3, columns=3))
-    network = seqopt.build_network(scene, "ends")
+    network = build_network(scene, "ends")
     assert sorted(_from_all_ends(scene)) == sorted(scene.build_order)
     assert not any(islands(network, count) for count in range(1, len(scene.bricks) + 1))
-
-
-@pytest.mark.parametrize(
-    ("order", "said"),
-    [
-        ("backwards", "order 'backwards': give reversed, ends, or names of bricks"),
-        ("1,2,3", "order: 2 bricks are missing, 4 among them"),
-        ("1,2,3,4", "order: brick 5 is missing; name every brick once"),
-        ("1,2,3,4,4", "order: 4 occurs twice"),
-        ((1, 2, 3, 4, 7), "order: 7 is no brick"),
-        (7, "order is 7; give whole numbers"),
-    ],
-)
-def test_what_is_no_order_gets_one_line(order, said):
-    with pytest.raises(SceneError, match=said) as caught:
-        seqopt.build_network(small_arch(5), order)
-    assert "\n" not in str(caught.value)
 
 
 # orders after words
@@ -379,3 +278,57 @@ def test_a_vault_closes_from_both_springings():
     bent = [brick.position[2] for brick in scene.bricks]
     assert max(bent) == pytest.approx(0.5, rel=0.02)
     assert bent == pytest.approx(bent[::-1])  # it is symmetric
+
+
+def propped(*props):
+    return load_scene("arch25").with_props(*(Prop(**each) for each in props))
+
+
+def loads(**given):
+    return replace(SCENE, loads=(Load(**{"brick": 1, "force": (0, 0, 1), **given}),))
+
+
+END = "ground end of brick 1: movement is "
+drawn = partial(scenarios, SCENE)
+order = partial(build_network, small_arch(5))
+sunk = partial(with_part, SCENE, "grounds", 0)
+WRONG = {  # what is said, and what it is said of
+    "stiffness is": lambda: drawn(stiffness=(3, 1)),
+    "stiffness is 3.0; give the least and the largest factor": lambda: drawn(stiffness=3.0),
+    "density is 1.0; give a number from 0 to below 1": lambda: drawn(density=1.0),
+    "position is nan; give a number from 0": lambda: drawn(position=math.nan),
+    "scenario 1 of .* is not a valid scene": lambda: drawn(position=1e20),
+    "count is 0; give a whole number from 1": lambda: drawn(count=0),
+    "seed is": lambda: drawn(seed=-1),
+    "grips is 3; give the least and the largest": lambda: drawn(grips=3),
+    "has no such brick": lambda: as_built(SCENE, {99: (0.0, 0.0, 0.0)}),
+    "from where it was planned": lambda: as_built(SCENE, measured_at({1: (5.0, 0.0, 0.0)})),
+    "load on brick 9: there is no brick 9": lambda: loads(brick=9),
+    "there is no brick 8": lambda: loads(since=8),
+    "load on brick 1: position is .*; move it to its brick": lambda: loads(position=(0, 0, 1e10)),
+    "give three finite numbers": lambda: loads(force=(0, 0, np.inf)),
+    "wind is .*; give shares of the weight": lambda: replace(SCENE, wind=(1e7, 0.0, 0.0)),
+    "brick 1: it weighs .*; correct its density": lambda: replace(SCENE, weight_factor=1e150),
+    f"{END}.*; move it to its bricks": lambda: sunk(movement=(0, 0, 1e30)),
+    f"{END}.*; give three or six numbers": lambda: sunk(movement=(0, 0)),
+    f"{END}.*; give three finite numbers": lambda: sunk(movement=(0, 0, np.nan)),
+    f"{END}0.1; give three or six numbers": lambda: sunk(movement=0.1),
+    "prop at node 99: there is no free node 99; known are": lambda: propped({"node": 99}),
+    "a prop at node 3 occurs twice; give each its own": lambda: propped({"node": 3}, {"node": 3}),
+    "prop at node 0: there is no free node 0": lambda: propped({"node": 0}),  # it is blocked
+    "prop: node is 0.5; give a whole number": lambda: Prop(node=0.5),
+    "direction is .* give one that is not zero": lambda: Prop(node=3, direction=(0, 0, 0)),
+    "prop at node 3: stiffness is -1; give one number or three": lambda: Prop(node=3, stiffness=-1),
+    "order 'backwards': give reversed, ends, or names of bricks": lambda: order("backwards"),
+    "order: 2 bricks are missing, 4 among them": lambda: order("1,2,3"),
+    "order: brick 5 is missing; name every brick once": lambda: order("1,2,3,4"),
+    "order: 4 occurs twice": lambda: order("1,2,3,4,4"),
+    "order: 7 is no brick": lambda: order((1, 2, 3, 4, 7)),
+    "order is 7; give whole numbers": lambda: order(7),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_cannot_be_meant_is_one_line(said):
+    with one_line(SceneError, said):
+        WRONG[said]()

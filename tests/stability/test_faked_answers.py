@@ -28,12 +28,12 @@ from seqopt.stability.verdict import Verdict
 SLIPPERY = Mortar(friction=1e-3)
 
 
-def wedged():
-    """A bar between two walls, which only friction holds."""
-    bar = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    vertex = np.concatenate([bar, bar + np.array([0, 0, 1])])
-    ends = [Contact((-1, 0), vertex[[0, 3, 7, 4]]), Contact((-1, 0), vertex[[1, 2, 6, 5]])]
-    return Blocks(vertex[None], tuple(ends)).assembly(2000.0)
+def bar(*, on_the_ground=False):
+    """A bar between two walls; perhaps it lies on the ground as well."""
+    base = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    vertex = np.concatenate([base, base + np.array([0, 0, 1])])
+    faces = [vertex[[0, 3, 7, 4]], vertex[[1, 2, 6, 5]], *([base] if on_the_ground else [])]
+    return Blocks(vertex[None], tuple(Contact((-1, 0), face) for face in faces)).assembly(2000.0)
 
 
 @cache
@@ -48,8 +48,8 @@ def structures():
         "a stack that just falls": (stack([0.501]).assembly(2000.0), DRY, falls),
         "a thick arch": (ring(9, 5.0, 0.9).assembly(2000.0), DRY, stands),
         "a thin arch": (ring(9, 5.0, 0.3).assembly(2000.0), DRY, falls),
-        "a bar between walls": (wedged(), SLIPPERY, stands),
-        "a bar between smooth walls": (wedged(), Mortar(friction=0.0), falls),
+        "a bar between walls": (bar(), SLIPPERY, stands),
+        "a bar between smooth walls": (bar(), Mortar(friction=0.0), falls),
         "step 26": (step[25], DRY, stands),
         "step 27": (step[26], DRY, falls),
     }
@@ -187,20 +187,22 @@ def test_no_faked_answer_turns_a_verdict(route):
         assert {(truth, truth), (truth, Verdict.UNDECIDED)} <= set(verdicts)
 
 
+def liar(change):
+    """A compiler whose programs change what the true one answers."""
+
+    def compiled(assembly):
+        program = compile_equilibrium(assembly)
+        return lambda case, attempt: change(program(case, attempt), assembly)
+
+    return compiled
+
+
 @pytest.mark.parametrize("more", [2e-6, 5e-4, 9e-4])
 def test_a_value_alone_says_neither_falls_nor_how_much_friction_is_needed(more):
     """The motion of a structure that stands proves nothing, whatever the value beside it."""
 
-    def compiled(assembly):
-        program = compile_equilibrium(assembly)
-
-        def answer(case, attempt):
-            true = program(case, attempt)
-            return replace(true, claim=Claim.ALMOST, value=true.value + more)
-
-        return answer
-
-    result = assess(stack([0.2]).assembly(2000.0), DRY, compiled=compiled)
+    almost = liar(lambda a, _: replace(a, claim=Claim.ALMOST, value=a.value + more))
+    result = assess(stack([0.2]).assembly(2000.0), DRY, compiled=almost)
     assert result.verdict is Verdict.UNDECIDED
     assert not result.friction > 0
 
@@ -247,16 +249,6 @@ def by_value(stand):
 
 
 # verdicts and their proofs: solvers that lie or stall, every published step
-def liar(change):
-    """A compiler whose programs change what the true one answers."""
-
-    def compiled(assembly):
-        program = compile_equilibrium(assembly)
-        return lambda case, attempt: change(program(case, attempt), assembly)
-
-    return compiled
-
-
 def test_almost_solved_is_counted_and_put_to_the_proof():
     leaning = stack([0.7]).assembly(2000.0)
     almost = liar(lambda a, _: replace(a, claim=Claim.ALMOST))
@@ -305,14 +297,6 @@ def test_minus_infinity_is_no_proof():
 
 
 # structures that stand only because they are wedged in place are marked
-def bar(*, on_the_ground=False):
-    """A bar between two walls; perhaps it lies on the ground as well."""
-    base = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    vertex = np.concatenate([base, base + np.array([0, 0, 1])])
-    faces = [vertex[[0, 3, 7, 4]], vertex[[1, 2, 6, 5]], *([base] if on_the_ground else [])]
-    return Blocks(vertex[None], tuple(Contact((-1, 0), face) for face in faces)).assembly(2000.0)
-
-
 def rows_of(table):
     return table.to_dict("records")
 

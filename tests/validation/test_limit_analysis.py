@@ -13,9 +13,9 @@ from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.scene.parts import Robot
-from seqopt.stability._screens import STANDS, HeldStates, Margins, Screen, _decided, _narrow
-from seqopt.stability.assessment import assess, bonded
-from seqopt.stability.limit_analysis import EXACT, sideways
+from seqopt.stability._screens import STANDS, Margins, Screen, _decided
+from seqopt.stability.assessment import assess
+from seqopt.stability.limit_analysis import EXACT
 from seqopt.stability.verdict import Verdict
 from tests.builders import block, held, lacking
 
@@ -78,11 +78,6 @@ def test_the_overhanging_block_needs_a_bond_and_goes_first():
     assert assess(leaning, strong).verdict is Verdict.STANDS
     weak = replace(DRY, tensile_strength=0.99 * result.bond, cohesion=2 * result.bond)
     assert assess(leaning, weak).verdict is Verdict.FALLS
-    states = HeldStates(leaning, bonded(leaning, Mortar(friction=DRY.friction)), compile_held)
-    low, high = states.bracket(*NOBODY, _narrow)[0] * leaning.stress_scale
-    exact = weight * excess / (face * face / 2)
-    assert low * (1 - 1e-9) <= exact <= high * (1 + 1e-9)
-    assert high - low < 2e-3 * exact
 
 
 @pytest.mark.parametrize(("half_span", "height"), [(1.0, 1.0), (1.0, 2.5), (2.0, 1.5)])
@@ -165,14 +160,6 @@ def test_linear_programs_know_the_friction_angle(across):
         assert stands(inclined, Mortar(friction=friction)) is np.bool_(expected)
 
 
-@pytest.mark.parametrize("blocks", [2, 6])
-def test_the_leaning_stack_is_harmonic(blocks):
-    limit = [0.5 / i for i in range(blocks - 1, 0, -1)]
-    for factor, expected in ((0.9999, True), (1.0001, False)):
-        leaning = stack([factor * x for x in limit]).assembly(1800.0)
-        assert stands(leaning, DRY) is np.bool_(expected)
-
-
 def test_linear_programs_know_the_lever():
     """At a point above the edge, at right angles to the lever: the ball is round as well."""
     leaning = stack([0.6]).assembly(2000.0)
@@ -191,17 +178,6 @@ def test_linear_programs_know_the_lever():
     rough, places = Mortar(friction=5.0), np.array([[0]])
     assert stands(hand, rough, places, np.array([[1.0001 * least]]))
     assert not stands(hand, rough, places, np.array([[0.9999 * least]]))
-
-
-def test_a_cube_slides_or_tips_when_it_is_tilted():
-    cube = stack([]).assembly(2000.0)
-    for friction, expected in ((0.3, 0.3), (5.0, 1.0)):
-        fixed = replace(bonded(cube, Mortar(friction=friction)), tension=(0, 0), cohesion=(0, 0))
-        for case in sideways(fixed, (0.0, 0.0, 1.0))[::2]:
-            low, high = HeldStates(cube, case, compile_held).bracket(*NOBODY, _narrow)[0]
-            assert low <= expected * (1 + 1e-9)
-            assert expected <= high * (1 + 1e-9)
-            assert high - low < 2e-3
 
 
 def test_margins_of_a_brick_on_the_ground():

@@ -188,18 +188,18 @@ def test_weight_loads_and_movements_add_up(kind):
         {**nothing, **still, "wind": scene.wind},
         nothing,
     )
-    for bricks in (len(scene.bricks),):
-        for grips in some_grips(scene, bricks):
-            answers = [
-                ComplianceEngine(replace(scene, **part)).solve(bricks, [grips], Want.ALL)
-                for part in parts
-            ]
-            total = answers[0]
-            for other in answers[1:]:
-                total = replace(total, **{n: getattr(total, n) + getattr(other, n) for n in NAMES})
-            together = ComplianceEngine(scene).solve(bricks, [grips], Want.ALL)
-            assert apart(together, total) < 1e-9
-            assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)
+    bricks = len(scene.bricks)
+    for grips in some_grips(scene, bricks):
+        answers = [
+            ComplianceEngine(replace(scene, **part)).solve(bricks, [grips], Want.ALL)
+            for part in parts
+        ]
+        total = answers[0]
+        for other in answers[1:]:
+            total = replace(total, **{n: getattr(total, n) + getattr(other, n) for n in NAMES})
+        together = ComplianceEngine(scene).solve(bricks, [grips], Want.ALL)
+        assert apart(together, total) < 1e-9
+        assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)
 
 
 def test_a_factor_on_weight_is_a_factor_on_answers():

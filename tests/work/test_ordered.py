@@ -14,7 +14,7 @@ import pytest
 
 from seqopt import work
 from seqopt.errors import SolverError, WorkerError
-from seqopt.work import Progress, hire, map_ordered
+from seqopt.work import Progress, map_ordered, worker_pool
 from tests.builders import ROOT
 from tests.work.tasks import die_once, die_while_sending, own_error, square, square_or_fail
 
@@ -25,14 +25,14 @@ WANTED = [number * number for number in range(12)]
 @pytest.mark.slow
 def test_results_come_in_order_whoever_works():
     assert list(map_ordered(square, range(12))) == WANTED
-    with hire(workers=2) as crew:
-        assert crew.workers == 2
+    with worker_pool(workers=2) as pool:
+        assert pool.workers == 2
         for _ in range(2):  # again, on the same processes
-            assert list(map_ordered(square, TASKS, crew)) == WANTED
+            assert list(map_ordered(square, TASKS, pool)) == WANTED
     assert multiprocessing.active_children() == []
     for kind in (ThreadPoolExecutor, ProcessPoolExecutor):
-        with kind(2) as executor, hire(executor) as crew:
-            assert list(map_ordered(square, range(12), crew)) == WANTED
+        with kind(2) as executor, worker_pool(executor) as pool:
+            assert list(map_ordered(square, range(12), pool)) == WANTED
 
 
 def test_tasks_are_taken_as_they_are_needed():
@@ -43,8 +43,8 @@ def test_tasks_are_taken_as_they_are_needed():
             taken.append(number)
             yield number
 
-    with ThreadPoolExecutor(2) as executor, hire(executor) as crew:
-        results = map_ordered(square, tasks(), crew)
+    with ThreadPoolExecutor(2) as executor, worker_pool(executor) as pool:
+        results = map_ordered(square, tasks(), pool)
         assert next(results) == 0
         assert len(taken) <= 8
         results.close()
@@ -53,8 +53,8 @@ def test_tasks_are_taken_as_they_are_needed():
 @pytest.mark.slow
 def test_the_first_error_is_raised_whoever_works():
     for workers in (1, 2):
-        found, crew = [], hire(workers=workers)
-        with pytest.raises(SolverError, match="no square of 3"), crew as hired:
+        found, pool = [], worker_pool(workers=workers)
+        with pytest.raises(SolverError, match="no square of 3"), pool as hired:
             found.extend(map_ordered(square_or_fail, TASKS[:9], hired))
     assert multiprocessing.active_children() == []
 
@@ -64,8 +64,8 @@ def test_the_first_error_is_raised_whoever_works():
 def test_a_worker_that_dies_ends_in_a_line_and_keeps_nobody_waiting(tmp_path, task):
     """Amid an answer, the rest of it was waited for without end."""
     wanted = pytest.raises(WorkerError, match=r"ended without an answer .*BrokenProcessPool")
-    with wanted as caught, hire(workers=2) as crew:
-        list(map_ordered(partial(task, tmp_path), TASKS, crew))
+    with wanted as caught, worker_pool(workers=2) as pool:
+        list(map_ordered(partial(task, tmp_path), TASKS, pool))
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir())  # it did die
     assert multiprocessing.active_children() == []
@@ -77,14 +77,14 @@ def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
     """Many calls wait when processes end; the control cancels them, over which a pool stumbles."""
     seen = []
     monkeypatch.setattr(threading, "excepthook", lambda seen_: seen.append(seen_.exc_type))
-    with hire(workers=2) as crew:
+    with worker_pool(workers=2) as pool:
         if cancels:  # as calls of an executor of others
             monkeypatch.setattr(work, "_Processes", type(None))
-        results = map_ordered(time.sleep, (0.0, *[30.0] * 20), crew)
+        results = map_ordered(time.sleep, (0.0, *[30.0] * 20), pool)
         next(results)
         time.sleep(0.5)  # until the pool has nothing to do but wait
         results.close()
-        for process in crew.executor._processes.values():
+        for process in pool.executor._processes.values():
             process.kill()
         time.sleep(1.0)
     old = sys.version_info < (3, 12)  # its pools have the fault
@@ -93,8 +93,8 @@ def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
 
 def test_an_executor_of_others_that_breaks_is_named(tmp_path):
     wanted = pytest.raises(WorkerError, match=r"without an answer .*BrokenProcessPool")
-    with ProcessPoolExecutor(2) as executor, wanted, hire(executor) as crew:
-        list(map_ordered(partial(die_once, tmp_path), range(12), crew))
+    with ProcessPoolExecutor(2) as executor, wanted, worker_pool(executor) as pool:
+        list(map_ordered(partial(die_once, tmp_path), range(12), pool))
 
 
 class Forgetful(Executor):
@@ -118,22 +118,22 @@ class Forgetful(Executor):
 @pytest.mark.parametrize("error", ["", "no machine yet"])
 def test_what_an_executor_of_others_loses_is_named(error):
     wanted = pytest.raises(WorkerError, match=f"answer .*{error or 'connection lost'}")
-    with wanted, hire(Forgetful(error), workers=2) as crew:
-        list(map_ordered(square, range(12), crew))
+    with wanted, worker_pool(Forgetful(error), workers=2) as pool:
+        list(map_ordered(square, range(12), pool))
 
 
 @pytest.mark.slow
 def test_an_error_that_cannot_be_sent_is_an_error_in_a_line():
-    with pytest.raises(WorkerError), hire(workers=2) as crew:
-        list(map_ordered(own_error, range(3), crew))
+    with pytest.raises(WorkerError), worker_pool(workers=2) as pool:
+        list(map_ordered(own_error, range(3), pool))
 
 
 ENDLESS = """
 import sys, time
-from seqopt.work import hire, map_ordered
+from seqopt.work import map_ordered, worker_pool
 if __name__ == "__main__":
-    with hire(workers=2) as crew:
-        for _ in map_ordered(time.sleep, [0.1, 600, 600], crew):
+    with worker_pool(workers=2) as pool:
+        for _ in map_ordered(time.sleep, [0.1, 600, 600], pool):
             print("under way", flush=True)
 """
 

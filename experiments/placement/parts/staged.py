@@ -32,7 +32,7 @@ from seqopt.engines.rigid._mixed import (
 from seqopt.errors import StepError
 from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network, network_of
-from seqopt.responses.table import _grips_of, response_table, step_named
+from seqopt.responses.table import response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence, require_steps
@@ -127,7 +127,7 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
         load[-2:] = network.inner_weight[2 * bricks - 2 : 2 * bricks]
         new = _fitted(network, before) if placing is Placing.FITTED else np.zeros(6)
         state = replace(state, twist=np.concatenate([before.twist, new]))
-    numbers = _grips_of(network.scene, step)
+    numbers = np.array([network.scene.grip_numbers(step.grips, bricks)], dtype=np.int64)
     columns, turn = grip_columns(network, bricks, numbers), np.zeros((bricks, 3))
     held = columns[0].tolist()
     for grip in set(before.grips) - set(held):

@@ -72,8 +72,8 @@ def run(
         others = {"margins": "", "friction": ", or give --map friction=0.3", "workers": ""}
         others |= {"mortar": ", or give --holds"}
         for name in (each for each in others if each in asked.words):
-            said = f"--{name}: not allowed with --map; leave one of them out{others[name]}"
-            raise ProblemError(said)
+            text = f"--{name}: not allowed with --map; leave one of them out{others[name]}"
+            raise ProblemError(text)
         return _map(words, map, named(holds or "dry,epoxy"), output, progress)
     if holds is not None:
         raise ProblemError(f"--holds {holds}: it goes with --map; give --map friction, say")
@@ -88,13 +88,13 @@ def run(
     wanted, shared = find_margins(values["margins"] or ()), (None, values["workers"])
     network, steps = given.network, given.steps
     for name, each in mortars.items():
-        told = with_progress(f"assessing steps, {_with_mortar(name)}", steps, progress)
+        reported = with_progress(f"assessing steps, {_with_mortar(name)}", steps, progress)
         found = each_stability(network, steps, each, wanted, shared=shared)
-        pairs = zip(told, found, strict=True)
+        pairs = zip(reported, found, strict=True)
         rows += [{"mortar": name, **stability_row(step, result)} for step, result in pairs]
     scene = network.scene
     carried = (f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
-    moves = (f"stability: {said}" for said in [_settlement_said(scene)] if said)
+    moves = (f"stability: {text}" for text in [_settlement_said(scene)] if text)
     notes = (*taken, *moves, *carried)
     return replace(_answer(output, mortars, rows), scene=scene, notes=notes)
 
@@ -115,12 +115,12 @@ def _answer(
         unsure = _steps_in_words([*dict.fromkeys(undecided)])
         failures = (f"seqopt: solver failed: {unsure}: undecided; this says nothing about them",)
         status = Status.FAILED
-    said = output.put(csv_text(rows), "\n".join(lines) + ";")
+    words = output.put(csv_text(rows), "\n".join(lines) + ";")
     if output.path is None:
-        said["text"] = "\n".join(
+        words["text"] = "\n".join(
             [*lines, "", *listed(rows, COUNTS), "", "--out FILE or --quiet: as CSV"]
         )
-    return Answer(facts, **said, failures=failures, status=status)
+    return Answer(facts, **words, failures=failures, status=status)
 
 
 def _map(

@@ -52,8 +52,8 @@ def read(
     scene = import_scene(file, format, given(progress=progress))
     write_file(out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
-    said = "\n".join([*assumed, f"{size_line(scene)}; written to {out}"])
-    return Answer({"assumed": assumed}, said, scene=scene, written=(out,))
+    text = "\n".join([*assumed, f"{size_line(scene)}; written to {out}"])
+    return Answer({"assumed": assumed}, text, scene=scene, written=(out,))
 
 
 def write(asked: Annotated[Call, ("call", export)], *, out: File = None, progress: Tell) -> Answer:
@@ -81,9 +81,9 @@ def write(asked: Annotated[Call, ("call", export)], *, out: File = None, progres
         else:
             notes = (*notes, *(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)))
     text = asked(scene=scene, steps=steps, progress=progress)
-    said, lost = f"{len(steps)} steps", form.lost
+    line, lost = f"{len(steps)} steps", form.lost
     if lost:
-        plan = "" if "steps" in lost else f" and {said}"
-        said = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"
+        plan = "" if "steps" in lost else f" and {line}"
+        line = f"{len(scene.bricks)} blocks{plan}, without {', '.join(lost)},"
     facts = {"steps": len(steps), "format": format, **({} if out else {"text": text})}
-    return Answer(facts, **output.put(text, said), notes=notes, scene=scene)
+    return Answer(facts, **output.put(text, line), notes=notes, scene=scene)

@@ -109,11 +109,11 @@ def _lines(instance: Instance, proof: Certificate) -> Iterator[str]:
     for goal, value, bound in zip(instance.goals, proof.values, proof.bounds, strict=True):
         left = (value - bound) / (abs(value) or 1.0)
         if not isfinite(bound):
-            said = "nothing is proven"
+            text = "nothing is proven"
         elif left <= TOLERANCE:
-            said = "proven: no path takes less"
+            text = "proven: no path takes less"
         else:
-            said = f"proven {bound:.9g}, gap {100 * left:.3g} %"
-        yield f"  {goal.name}: {value:.9g}; {said}"
+            text = f"proven {bound:.9g}, gap {100 * left:.3g} %"
+        yield f"  {goal.name}: {value:.9g}; {text}"
     if proof.claimed_gap < proof.gap - TOLERANCE:
         yield f"  claimed without proof: gap {100 * _known_gap(proof.claimed_gap):.3g} %"

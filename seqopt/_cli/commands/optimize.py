@@ -136,7 +136,7 @@ def _report(
 
 
 def _pictures(tables: Mapping[str, object]) -> int:
-    """Return how many pictures there are among files, in whatever formats."""
+    """Return how many pictures there are among files, in all formats."""
     return len({Path(name).stem for name in tables if name.endswith((".png", ".svg"))})
 
 

@@ -89,10 +89,10 @@ def run(
     )
     early = front.stopped == INTERRUPT
     points = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
+    text = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     answer = Answer(
         {**front_counts(front), "points": shown_table(front.table)},
-        f"{points}{said}; {output.said()}",
+        f"{points}{text}; {output.said()}",
         written=written,
         notes=notes,
         failures=(INTERRUPTED,) if early else (),

@@ -39,8 +39,8 @@ def run(
     $ seqopt scene arch25 --export my.json
     """
     if list:
-        told = with_progress("reading built-in scenes", builtin_scenes(), progress)
-        every = {name: load_scene(name) for name in told}
+        names = with_progress("reading built-in scenes", builtin_scenes(), progress)
+        every = {name: load_scene(name) for name in names}
         sizes = {n: f"{len(s.bricks)} bricks, {len(s.joints)} joints" for n, s in every.items()}
         listed = [f"{name}: {size}; {ABOUT[name]}" for name, size in sizes.items()]
         scenes = [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in every.items()]

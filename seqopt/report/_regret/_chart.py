@@ -161,8 +161,8 @@ def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:
                 most = max(most, value)
                 mark = _look(str(row["engine"]), str(row["schedule"]), filled=name == "regret")
                 axes.plot(_height(value), line, clip_on=False, ms=6, **mark | {"marker": marker})
-    said = [f"{row['engine']}, {row['schedule']}: {_words(row)}" for _, row in rows.iterrows()]
-    axes.set_yticks(range(len(rows)), said, fontsize=SMALL)
+    lines = [f"{row['engine']}, {row['schedule']}: {_words(row)}" for _, row in rows.iterrows()]
+    axes.set_yticks(range(len(rows)), lines, fontsize=SMALL)
     axes.set(xscale="log", xlim=(NONE / 3, 4 * most), ylim=(-0.6, len(rows) - 0.4))
     ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1, 2)]
     axes.set_xticks([NONE, *ticks], ["0", *map(percent, ticks)])
@@ -202,6 +202,6 @@ def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
         Line2D([], [], **mark, marker="o", mfc="none", ms=11, label="take this"),
     ]
     if len(tables) == 1:
-        said = {"regret": "regret", "gap": "proven gap", "error": "error of the model"}
-        marks += [Line2D([], [], **mark, marker=each, label=said[n]) for n, each in PARTS.items()]
+        words = {"regret": "regret", "gap": "proven gap", "error": "error of the model"}
+        marks += [Line2D([], [], **mark, marker=each, label=words[n]) for n, each in PARTS.items()]
     figure.legend(handles=marks, loc="outside lower center", ncols=across)

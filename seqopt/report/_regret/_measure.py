@@ -156,11 +156,11 @@ class _Course:
 
     def row(self, way: Way, seconds: float) -> dict[str, object]:
         """Return the row of a way, which may take so long."""
-        proof, told = way.without != "no proof", list[Finding]()
+        proof, found = way.without != "no proof", list[Finding]()
 
         def call() -> Plan:
-            told.clear()
-            how: dict[str, Any] = {"proof": proof, "progress": told.append}
+            found.clear()
+            how: dict[str, Any] = {"proof": proof, "progress": found.append}
             if "seconds" in find_formulation(way.formulation).options:
                 how["time_limit"] = KEPT * seconds
             return on_the_way(solve(self.problem(way), way.formulation, **how))
@@ -173,7 +173,7 @@ class _Course:
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
             return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
-        self.findings[:] = [each for each in told if isinstance(each, Finding)]
+        self.findings[:] = [each for each in found if isinstance(each, Finding)]
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]

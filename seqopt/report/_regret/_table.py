@@ -141,13 +141,13 @@ class RegretTable:
             else "no plan known is better"
         )
         lost = known if took["regret"] == 0 else f"{percent(took['regret'])} above the best known"
-        said = f"Take {way_named(took)}: {lost}, in {seconds_text(took['seconds'])}"
+        text = f"Take {way_named(took)}: {lost}, in {seconds_text(took['seconds'])}"
         if self.sooner.empty:
-            return f"{said}; nothing else is sooner by more than a tenth."
+            return f"{text}; nothing else is sooner by more than a tenth."
         one: Any = self.sooner.iloc[0]
         worse = f"its plan is {percent(one['regret'])} worse"
         end = worse if one["regret"] > took["regret"] else "its plan is as good, without a proof"
-        return f"{said}; sooner is {way_named(one)} in {seconds_text(one['seconds'])}: {end}."
+        return f"{text}; sooner is {way_named(one)} in {seconds_text(one['seconds'])}: {end}."
 
     def facts(self) -> dict[str, object]:
         """Return the summary, for scripts."""
