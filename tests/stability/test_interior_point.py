@@ -1,5 +1,7 @@
 """The search for forces: its systems, and where it begins."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -9,8 +11,11 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.network.network import build_network
 from seqopt.scene.library import chain
 from seqopt.stability._interior_point import Balance, approach
+from seqopt.stability._steps import judged
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import violation
+
+TIGHT = 1e-8  # violation, over the force scale, up to which forces prove
 
 
 @pytest.fixture
@@ -43,3 +48,15 @@ def test_forces_that_hold_are_where_a_search_begins(held):
         assert violation(held, case, first) <= 1e-6
         change = np.abs(np.vstack([first.contact_force, first.grip_force]) - near).max()
         assert bool(change > 1e-3) is apart
+
+
+@pytest.mark.parametrize(("share", "proves"), [(0.5, True), (2.0, False)])
+def test_forces_prove_within_their_tolerance_alone(held, share, proves):
+    case = bonded(held, EPOXY)
+    least = next(approach(held, case))
+    push = np.zeros(least.contact_force.shape)
+    push[0, 0] = 1.0
+    wrong = violation(held, case, replace(least, contact_force=least.contact_force + push))
+    given = least.contact_force + share * TIGHT / wrong * push
+    answer = replace(least, contact_force=given, motion=np.zeros(least.motion.shape))
+    assert (judged(held, case, answer) is not None) is proves
