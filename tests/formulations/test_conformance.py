@@ -365,3 +365,12 @@ def test_programs_keep_their_offset_bounds_and_equations(capfd):
     assert not found.stopped
     assert 0 <= found.compile_seconds < 600
     assert capfd.readouterr().out == ""  # the solver keeps quiet
+
+
+@pytest.mark.parametrize(("horizon", "path"), [(2, (1, 2, 5)), (3, (3, 4, 5))])
+def test_a_search_sees_as_far_as_its_horizon(horizon, path):
+    """Two moves that cost less lead to a third one that costs most."""
+    source, target = np.array([[0, 0, 1, 2, 3, 4], [1, 3, 2, 5, 4, 5]], dtype=np.int32)
+    cost = np.array([1.0, 2.0, 1.0, 9.0, 2.0, 1.0])[:, None]
+    graph = Graph(source, target, cost, (False,), np.arange(6) == 5)
+    assert rank_search.choose(graph, Watch(), horizon=horizon).path == path
