@@ -387,7 +387,7 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
             text = f"; or with one more robot that reaches every node: {found.result}"
         raise InfeasibleError(f"{error}{text}") from None
     rest = [step for step in steps if step.number > at]
-    changes = REPLAN.compared(new, rest, next(_gone(scene, new, rest, lost), ""))
+    changes = REPLAN.compared(new, rest, next(_gone(scene, new, rest, lost, site), ""))
     if measured is not None:
         planned = {brick.name: brick.position for brick in scene.bricks}
         bricks = new.engine.network.scene.bricks
@@ -397,10 +397,14 @@ def replan(  # noqa: PLR0913  # every question is a word of its own
     return replace(new, changes=changes)
 
 
-def _gone(scene: Scene, new: Plan, rest: Sequence[Step], lost: Sequence[str]) -> Iterator[str]:
+def _gone(
+    scene: Scene, new: Plan, rest: Sequence[Step], lost: Sequence[str], site: Site
+) -> Iterator[str]:
     """Yield which robot that is lost, or brick that is missing, steps of the old plan need."""
-    there = new.engine.network.scene.build_order
+    there, begin = new.engine.network.scene.build_order, new.states.free_rules.begin
     for step in rest:
+        if begin is not None and begin.bricks < site.bricks:
+            yield f"step {step.number}: brick {there[begin.bricks]} is missing, and comes first"
         holds = zip(scene.robots, step.grips, strict=False)
         for name in (r.name for r, node in holds if node is not None and r.name in lost):
             yield f"step {step.number}: {name} is lost"

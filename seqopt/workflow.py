@@ -35,10 +35,9 @@ from seqopt.responses._grip_sets import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, find_postures
 from seqopt.scene.scene_file import find_scene
-from seqopt.sequence.part import Part, _find_place, _Place, find_schedule, without
+from seqopt.sequence.part import Part, _find_place, find_schedule, without
 from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.steps import Site
 from seqopt.stability.standing import Standing
 from seqopt.study import EQUATIONS, find_criterion
 from seqopt.work import Clock, Tell
@@ -333,7 +332,10 @@ def pose_build(asked: Mapping[str, Any]) -> Problem:
     robots = None if isinstance(robots, int) else robots
     if part.direction == Direction.TAKE_DOWN.value and not free:
         raise ProblemError(f"direction {part.direction}: it goes with schedule={FREE!r}")
-    begin = _with_ages(scene, part.find_begin(scene), stands)
+    place = part.find_begin(scene)
+    begin = place.site
+    if begin and place.done and isinstance(stands, Standing) and stands.curing is not None:
+        begin = replace(begin, ages=required("mortar_ages")(scene, place.done, stands))
     if begin is not None and (part.lost or part.missing):
         scene, begin = without(scene, begin, part.lost, [*map(int, part.missing)])
     if part.lost:
@@ -383,11 +385,3 @@ def _find_moves(
         raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
     opened = find_schedule(network, part.schedule, robots or ())
     return opened if candidates is None else thin(opened, candidates)
-
-
-def _with_ages(scene: Scene, begin: _Place, stands: Standing | Mortar | str | None) -> Site | None:
-    """Return where a build begins, with the ages of its mortar if it cures, s."""
-    cures = isinstance(stands, Standing) and stands.curing is not None
-    if begin.site is None or not begin.done or not cures:
-        return begin.site
-    return replace(begin.site, ages=required("mortar_ages")(scene, begin.done, stands))

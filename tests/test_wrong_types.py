@@ -93,6 +93,12 @@ WRONG = {
     "cache is 5; give the path of a folder": lambda: seqopt.optimize(
         SCENE, search=seqopt.Search(cache=5)
     ),
+    "lost or missing rob1: give a list, as ['rob1']": lambda: seqopt.optimize(
+        SCENE, seqopt.Part(schedule="free", begin=2, lost="rob1")
+    ),
+    "lost or missing 2: give a list, as [2]": lambda: seqopt.optimize(
+        SCENE, seqopt.Part(schedule="free", begin=2, missing=2)
+    ),
     "robots 'rob1': give names": lambda: seqopt.optimize(SCENE, robots="rob1"),
     "aims 5: give goals": lambda: seqopt.optimize(SCENE, "free", aim=5),
     "T_max has the weight, scale or rounding 0.0; give a positive number": lambda: seqopt.optimize(

@@ -116,6 +116,15 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
     return tuple(f"robot {name}: its arm has {text}" for name, text in found if text)
 
 
+def unread_models(scene: Scene) -> Iterator[str]:
+    """Yield whose arm has a model that is not there or cannot be read, and why."""
+    for robot in scene.robots:
+        try:
+            _ = None if robot.arm is None else read_urdf(model_path(robot.arm))
+        except (SceneError, FileError) as error:
+            yield f"robot {robot.name}: {str(error).removeprefix('arm: ')}"
+
+
 def _followed(robot: _Link) -> list[str]:
     """Return the links except the root that have a joint at a distance from their own."""
     joints = [each for each in robot.findall("joint") if each.find("child") is not None]

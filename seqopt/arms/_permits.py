@@ -225,6 +225,8 @@ def reach_described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
 
 def reached_by_region(scene: Scene) -> tuple[pd.DataFrame, list[str]]:
     """Return the nodes that robots without arms reach, a row each, and a line for each robot."""
+    if not scene.robots:
+        raise SceneError(f"scene {scene.name}: it has no robots; give at least one")
     rows, lines = list[dict[str, Any]](), list[str]()
     barred = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
     free = [node for node in scene.placed_nodes if node not in barred]

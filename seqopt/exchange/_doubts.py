@@ -27,30 +27,57 @@ networkx, optimize = Later("networkx"), Later("scipy.optimize")  # slow to impor
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
 _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
-_FAR_REACH = 100.0  # m; of a robot
+_TINY_BRICK = 0.002  # m; the largest dimension of a brick whose lengths were meant in m
+_FAR_REACH = 100.0  # m; of a robot, and of the base of its arm
+_LONG_TOOL, _LONG = 10.0, 500.0  # m; of an arm, and of the whole structure
+_GALE = 5.0  # wind over weight
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def _find_odd_units(scene: Scene) -> Iterator[str]:
     """Yield a line on gravity, lengths and densities that seem to be in other units."""
-    pull = math.hypot(*scene.gravity)
-    if pull > _PULL:
+    at, down = np.array([brick.position for brick in scene.bricks]), np.array(scene.gravity)
+    if (pull := math.hypot(*down)) > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
+    if max(np.dot(end.position, down) for end in scene.grounds) < (at @ down).min():
+        yield "gravity points away from every ground end; check its sign"
+    if (length := np.ptp(at, axis=0).max()) > _LONG:
+        yield f"it is {length:.4g} m long, which looks like millimeters; give meters"
+    if (wind := max(map(abs, scene.wind))) > _GALE:
+        yield f"wind is {wind:g} times the weight; give a share of the weight, as 0.1"
     large = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
+    tiny = [brick for brick in scene.bricks if max(brick.dimensions) < _TINY_BRICK]
     odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
     for found, text in (
-        (large, "dimensions of {0.dimensions} m look like millimeters; give meters"),
+        (large, "dimensions of {1} m look like millimeters; give meters"),
+        (tiny, "dimensions of {1} m are tiny; check their unit"),
         (odd, "a density of {0.density:g} kg/m³ is odd; check its unit"),
     ):
         if found:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            yield f"brick {found[0].name}{more}: {text.format(found[0])}"
-    far = [r for r in scene.robots if isinstance(r.reach, Sphere) and r.reach.radius > _FAR_REACH]
-    for robot in far[:1]:
-        yield f"{robot.name}: a reach of {robot.reach.radius:g} m looks like millimeters"  # type: ignore[union-attr]
+            sizes = tuple(float(f"{size:.6g}") for size in found[0].dimensions)
+            yield f"brick {found[0].name}{more}: {text.format(found[0], sizes)}"
+    far = {what: (label, length) for label, what, length, most in _lengths(scene) if length > most}
+    for what, (label, length) in far.items():
+        yield f"{label}: {what} of {length:g} m looks like millimeters; give meters"
     moved = [end for end in scene.grounds if end.movement and max(map(abs, end.movement)) > 1]
     for end in moved[:1]:
         yield f"{end.label}: a movement of {max(map(abs, end.movement or ())):g} is m or rad"
+
+
+def _lengths(scene: Scene) -> Iterator[tuple[str, str, float, float]]:
+    """Yield lengths, m, that may be meant in millimeters: whose, of what, and the usual most."""
+    for robot in reversed(scene.robots):
+        if isinstance(robot.reach, Sphere):
+            yield robot.name, "a reach", robot.reach.radius, _FAR_REACH
+        if robot.arm is not None:
+            yield robot.name, "a tool_length", robot.arm.tool_length, _LONG_TOOL
+            yield robot.name, "a position of its arm", math.hypot(*robot.arm.position), _FAR_REACH
+    large = {brick.name: max(brick.dimensions) for brick in scene.bricks}
+    springs: tuple[Joint | Ground, ...] = (*reversed(scene.joints), *scene.grounds)
+    for spring in springs:
+        most = min(large[end] for end in spring.ends)
+        yield spring.label, "a thickness", spring.thickness or 0.0, most
 
 
 def find_doubts(scene: Scene, *, made: bool = False) -> Iterator[str]:

@@ -75,6 +75,7 @@ _DOES = {  # whose grip changes, by the kind of the step and whether it ends wit
 }
 _SAID = ("robot", "block", "node", "built")
 _DIGITS = 9  # of numbers in a table: a micrometer in a kilometer
+_FARTHEST = 10.0  # m; from a grip to where a tool comes from
 FRAMES = ("block_frame", "grip", "approach", "retreat", "grip_in_block")
 
 
@@ -103,7 +104,7 @@ def plan_tasks(
     Raises
     ------
     SceneError
-        If the distance is not positive.
+        If the distance is not positive, or longer than an arm.
 
     Examples
     --------
@@ -115,6 +116,8 @@ def plan_tasks(
     [('rob2', 'pick', 2), ('rob2', 'place', 2), ('rob1', 'hold', 1)]
     """
     far = None if distance is None else positive("distance", distance, "m")
+    if far is not None and far > _FARTHEST:
+        raise SceneError(f"distance is {far:g} m; give at most {_FARTHEST:g}, in meters")
     found = cache(lambda robot, node: hold(scene, robot, node))
     last: Grips = (None,) * len(scene.robots)
     for step in steps:

@@ -252,9 +252,10 @@ def _find_contacts(
     Places are those of the file; the ground, which blocks not built belong to, comes first.
     """
     facets, gap = [block.facets for block in blocks], _widest_gap(given, bricks)
-    lines = [
-        f"faces are found where blocks are no more than {length_text(float(f'{gap:.3g}'))} apart"
-    ]
+    thinnest = min(min(brick.dimensions) for brick in bricks.values())
+    odd = f", more than the thinnest block: {length_text(thinnest)}" * (gap > thinnest)
+    near = length_text(float(f"{gap:.3g}"))
+    lines = [f"faces are found where blocks are no more than {near} apart{odd}"]
     faces = list[_Held]()
     for pair, face in touching_faces(facets, gap, given.progress):
         a, b = (i if i in bricks else GROUND for i in pair)

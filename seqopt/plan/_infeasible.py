@@ -37,9 +37,10 @@ from seqopt.problem.amounts import BUILT_IN, LARGEST, STATE_RESPONSES, worst
 from seqopt.problem.requirements import IGNORED, STANDING, Excess, Limit
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
-from seqopt.scene.scene import loads
+from seqopt.scene.scene import _hang_free, loads
 from seqopt.sequence.rules import FREE, _RuleBook
 from seqopt.sequence.rules import _unbearable as too_heavy_steps
+from seqopt.sequence.schedule import islands
 from seqopt.stability.standing import Standing
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
@@ -105,13 +106,12 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
     lines = list[str]()
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         goal = problem.goals[k]
-        least = -np.inf  # of a makespan
-        if not goal.in_time:
-            least = distances(graph, graph.amounts[:, k])[graph.ends].min()
+        none = goal.in_time  # a makespan has no least here
+        least = -np.inf if none else distances(graph, graph.amounts[:, k])[graph.ends].min()
         alone = " by itself" if least <= tied(cap) else ""
-        at_least = f"{goal} is at least {value_text(goal.name, least)}{alone}, and "
-        at_least *= bool(np.isfinite(least))
-        lines.append(f"{at_least}{value_text(goal.name, cap)} is allowed")
+        known = f"{goal} is at least {value_text(goal.name, least)}{alone}, and "
+        known = known if np.isfinite(least) else f"--aim {goal} finds its least, and "
+        lines.append(f"{known}{value_text(goal.name, cap)} is allowed")
     proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
     why = f"{problem.title}: no plan is within all budgets; {', '.join(lines)}"
     return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
@@ -188,6 +188,8 @@ def _why_impossible(problem: States, look: Look) -> str:
         if not finished and all(name == "arms" for name, *_ in ways):
             found += [*islice(_pairs(problem, look, arms=not ways), 1)]
         helps = ", even if two rules or limits are loosened; extend a reach or add a robot"
+        if " free: " in where:  # a brick hangs
+            helps = "; give another order (--order)"
         if found:
             helps = f"; it becomes possible with {' or '.join(dict.fromkeys(found))}"
             if "--payload" in helps and "--grips" not in helps:
@@ -238,9 +240,14 @@ def _where(problem: States, reached: int) -> str:
     down, at = rules.takes_down, space.bricks_at(reached) + (not rules.takes_down)
     left, done = (range(at, end, -1), "removed") if down else (range(at, end + 1), "placed")
     where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
+    if hung := [part for part in islands(problem.network, at) if placed[at - 1].name in part]:
+        return f"{where}: {_hang_free(hung[0])}"
     book = _RuleBook(problem.network, rules, problem.worlds)
     for bricks in left:
         near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
+        if not near:
+            name = placed[bricks - 1].name
+            return f"{where}: of robots that may, none reaches a free node of brick {name}"
         heavy = book.too_heavy(bricks, near)
         if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
             return f"{where}: {heavy}"  # the next brick, or one that no robot can lift

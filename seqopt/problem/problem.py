@@ -201,7 +201,7 @@ def _parse(text: str) -> Budget:
     amount = known[name]
     share |= name == "travel" and not found["unit"]
     if found["of"] or found["level"] or not (share or found["unit"] == amount.unit):
-        raise ProblemError(f"budget {text}: give {name}=NUMBER{amount.unit}")
+        raise ProblemError(f"budget {text}: give it as {name}={bound:g}{amount.unit}")
     return Budget(amount, bound, share)
 
 

@@ -88,6 +88,8 @@ def front_figure(
     figure = new_figure(0.8 + 2.5 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     scene, marks = front.engines[0].network.scene, dict[str, dict[str, float]]()
+    low, high = table["steps"].min(), table["steps"].max()
+    shades = {"vmin": low, "vmax": max(high, low + 1)}  # one scale, also where all are alike
     for name, rows in methods.items():
         worst = largest(scene, rows)
         marks[name] = {**worst, "F_largest": worst["F_rob"], "steps": len(rows)}
@@ -96,7 +98,7 @@ def front_figure(
             ways = (_in_shown_unit(other[c], c) for c in (first, name))
             axes.plot(*ways, "o", ms=4, mfc="none", mec=GRAY, mew=0.8, label=f"{label}, its set")
         x, y = (_in_shown_unit(table[c], c) for c in (first, name))
-        dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
+        dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2, **shades)
         mark: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
         mark["zorder"] = 3
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):

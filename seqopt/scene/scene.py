@@ -590,7 +590,7 @@ def with_robots(scene: Scene, count: int) -> Scene:
     and durations of the first of them.
     """
     if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: give a number from one to {MOST_ROBOTS}")
+        raise StepError(f"{short(count)} robots: give a number from 1 to {MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     fresh = [f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names]

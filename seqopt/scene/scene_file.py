@@ -256,9 +256,9 @@ def _read(kind: type, given: Any, where: str) -> Any:
         if kind is Scene and name in _KINDS:
             each = enumerate(rows(inner, value))
             own[name] = [_read(_KINDS[name], part, f"{inner}[{i}]") for i, part in each]
-        elif name == "reach" and isinstance(value, dict):
-            reach = _REACHES[one_of(f"{inner}: kind", value.get("kind"), _REACHES)]
-            rest = {k: v for k, v in value.items() if k != "kind"}
+        elif name == "reach":
+            rest = dict(value) if isinstance(value, dict) else {"kind": value}
+            reach = _REACHES[one_of(f"{inner}: kind", rest.pop("kind", None), _REACHES)]
             own[name] = _read_within(reach, rest, name, where)
         elif name in ("shape", *_OFFERED) and value is not None:
             part = Polyhedron if name == "shape" else required(_OFFERED[name])

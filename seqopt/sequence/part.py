@@ -69,6 +69,8 @@ class Part:
     def find_begin(self, scene: Scene) -> _Place:
         """Return where it begins; changes need a build that goes on."""
         begin = _find_place(self.begin, "begin", scene)
+        if alone := [each for each in (self.lost, self.missing) if isinstance(each, str | int)]:
+            raise StepError(f"lost or missing {alone[0]}: give a list, as [{alone[0]!r}]")
         if wrong := [name for name in self.missing if not str(name).isdecimal()]:
             raise StepError(f"missing {wrong[0]}: give the number of a brick")
         changes = (*(("lost", n) for n in self.lost), *(("missing", n) for n in self.missing))

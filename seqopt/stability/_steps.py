@@ -382,5 +382,7 @@ def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
         value = value if np.isfinite(values[worst]) else "no value is enough"
         if column == _TILT and found[Verdict.FALLS.value]:  # others survive none
             value = f"steps that stand {value.replace('survives', 'survive')}"
-        ends += f"; {name}: {value} (step {rows[worst]['step']})"
+        lacks = int(np.isnan(values).sum()) - (column == _TILT) * found[Verdict.FALLS.value]
+        more = f", not known of {lacks} steps" * (lacks > 0)
+        ends += f"; {name}: {value} (step {rows[worst]['step']}{more})"
     return f"{len(rows)} steps: {said}; proven {by}{ends}"

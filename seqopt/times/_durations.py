@@ -73,7 +73,8 @@ def with_durations(scene: Scene, *texts: str) -> Scene:
         if colon and name not in names:
             hint = did_you_mean(name, names)
             raise SceneError(f"durations {text}: no robot {name!r}{hint}; give {', '.join(names)}")
-        known = dict.fromkeys(NAMES, (float, f"a number of s, as {EXAMPLE}"))
+        units = ((name, "m/s" if name == "speed" else f"s, as {EXAMPLE}") for name in NAMES)
+        known = {name: (float, f"a number of {unit}") for name, unit in units}
         given = in_words(f"durations {text}", words.split(","), known, f", as {EXAMPLE}")
         for index in (i for i, robot in enumerate(names) if robot == name or not colon):
             before = out[index]

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from seqopt._cli.main import main
+from seqopt.arms import Arm
 from seqopt.exchange._files import json_value
 from seqopt.scene.parts import Sphere
 from seqopt.scene.scene_file import load_scene, save_scene
@@ -190,6 +191,26 @@ def test_options_reach_the_scene(tmp_path):
     assert (scene.name, len(scene.robots), len(scene.bricks)) == ("stack", 2, 2)
     assert "no more than 100 µm apart" in " ".join(scene.provenance.split())
     assert scene.joints[0].translational_stiffness == pytest.approx((2e5, 1e5, 1e5))
+
+
+def test_gaps_wider_than_blocks_are_said(capsys, tmp_path):
+    path, out = tmp_path / "boxes.csv", tmp_path / "scene.json"
+    path.write_text(BOXES, encoding="utf-8")
+    for gap, odd in (("0.0001", False), ("5", True)):
+        words = ("--unit", "cm", "--density", "1000", "--gap", gap, "--out", out)
+        _, said, _ = run(capsys, "import", path, *words)
+        assert ("apart, more than the thinnest block: " in " ".join(said.split())) == odd
+
+
+def test_an_arm_without_its_model_is_named(capsys, tmp_path):
+    wall = load_scene("wall:columns=3,courses=2")
+    model = tmp_path / "no.urdf"
+    arm = Arm(urdf=str(model), position=(0.0, 1.5, 0.0), tool_length=0.3, tool_radius=0.05)
+    for robots in (wall.robots, (replace(wall.robots[0], arm=arm), *wall.robots[1:])):
+        save_scene(wall.with_robots(*robots), tmp_path / "arm.json")
+        status, _, err = run(capsys, "scene", tmp_path / "arm.json")
+        said = [f"robot rob1: there is no file {model}; give a URDF, or package:path"]
+        assert (status, err.splitlines()) == (0, said * (robots[0].arm is not None))
 
 
 def test_robots_without_arms_reach_what_their_regions_cover(capsys, tmp_path):

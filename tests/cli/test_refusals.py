@@ -1,21 +1,24 @@
 """What cannot be answered is one line that says why, with its status; nothing is written.
 
-``ARCH`` stands for a scene of five bricks, ``SIX`` for one of six, ``PLAN`` for the folder of a
-plan of the first.
+``ARCH`` stands for a scene of five bricks, ``SIX`` for one of six, ``FAR`` and ``BARE`` for the
+first with robots that reach nothing and without any, ``PLAN`` for the folder of a plan of it.
 """
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from seqopt._cli.arguments import parser
 from seqopt._cli.registry import COMMANDS
+from seqopt.scene.parts import Sphere
 from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks, small_arch
 from tests.commands import command
 
 VLR = "assess arch:span=1,rise=0.4,pattern=VLR --method sequential"
 FREE = "optimize ARCH --schedule free"
+TIMED = f"{FREE} --durations fetch=30,place=10,approach=10,grip=5,release=5"
 ROBUST = "optimize SIX --robust"
 WALL = "wall:columns=2,courses=2"
 BAD = {
@@ -59,7 +62,7 @@ BAD = {
     f"{ROBUST} worst-peak --vary wind=2": "--vary wind=2 does not exist; give one of stiffness",
     # the free schedule
     f"{FREE} --aim speed": "aim 'speed' does not exist",
-    f"{FREE} --robots 7": "7 robots: give a number from one to 5",
+    f"{FREE} --robots 7": "7 robots: give a number from 1 to 5",
     f"{FREE} --option width=0": "options width=0, growth=1.1: give a whole number",
     f"{FREE} --option speed=1": "--option speed=1: schedule_search has width",
     f"{FREE} --formulation minimax --aim steps": "minimax: a sum comes first",
@@ -69,6 +72,11 @@ BAD = {
     f"{FREE} --stands dry --tilt 90": "--tilt 90: give an angle from 0 to below 90 degrees",
     f"{FREE} --stands dry --rule payload=ignored": "holds up anything",
     f"{FREE} --budget trips=0.8": "give travel=3.5m, makespan=600s, regrips=2",
+    f"{FREE} --budget makespan=60": "budget makespan=60: give it as makespan=60s",
+    "times ARCH --durations speed=200mm/s": "speed is '200mm/s'; give a number of m/s",
+    "times ARCH --durations fetch=30s": "fetch is '30s'; give a number of s, as fetch=30,place=10",
+    "reach BARE": "it has no robots; give at least one",
+    "export ARCH --format tasks --distance 150": "distance is 150 m; give at most 10, in meters",
     f"{FREE} --direction takedown": "did you mean take-down?",
     f"{FREE} --direction take-down --keep 1..2": "unrecognized arguments: --keep",
     f"{FREE} --direction take-down --order search": "give an order",
@@ -109,6 +117,11 @@ BAD = {
     f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }
 NO_ANSWER = {
+    f"{FREE} --order 1,3,2,4,5": "brick 3 (2 of 5) is never placed: brick 3 hangs free: no joint",
+    f"{FREE} --order 1,4,2,3,5": "no joint leads to the ground; give another order (--order)",
+    "optimize FAR --schedule free": "never placed: of robots that may, none reaches a free node of",
+    "optimize FAR --schedule free --rule placers=rob2": "may, none reaches a free node of",
+    f"{TIMED} --budget makespan=1s": "within all budgets; --aim makespan finds its least, and 1 s",
     f"{FREE} --payload 20": "grips that give way (--grips 1e6) may do with a smaller payload",
     f"{ROBUST} worst-peak --scenarios 2 --budget travel=0.8": "within all budgets; travel is at",
     f"{ROBUST} worst-total --scenarios 2 --limit F_largest=1": "F_largest",
@@ -134,7 +147,9 @@ def scenes(tmp_path_factory):
     """Paths of scenes, and of a plan, by the words that stand for them."""
     home = tmp_path_factory.mktemp("scenes")
     bare = small_arch(5).with_robots()
-    made = {"ARCH": small_arch(5), "SIX": six_bricks(), "BARE": bare}
+    away = Sphere(center=(50.0, 0.0, 0.0), radius=1.0)
+    far = small_arch(5).with_robots(*(replace(r, reach=away) for r in small_arch(5).robots))
+    made = {"ARCH": small_arch(5), "SIX": six_bricks(), "BARE": bare, "FAR": far}
     for name, scene in made.items():
         save_scene(scene, home / f"{name}.json")
     (home / "PLAN").mkdir()
@@ -155,7 +170,7 @@ def test_it_is_one_line_and_writes_nothing(
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("seqopt.work.GRACE", 60.0)  # posing is not late on a busy machine
-    words = re.sub("ARCH|SIX|BARE|PLAN", lambda found: str(scenes[found[0]]), words).split()
+    words = re.sub("ARCH|SIX|BARE|FAR|PLAN", lambda found: str(scenes[found[0]]), words).split()
     more = ["--out", "out"] if words[0] == "optimize" else []
     found, out, err = command(capsys, *words, *more)
     assert (found, out, err.count("\n")) == (status, "", 1), err

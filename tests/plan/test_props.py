@@ -185,6 +185,8 @@ def test_what_is_gone_is_named_where_the_old_rest_cannot_go_on():
     told = seqopt.replan(PLAN, at, missing=[4]).changes
     place = next(s.number for s in PLAN.steps if (s.kind, s.bricks) == (StepKind.PLACE, 4))
     assert told["broken"] == f"step {place}: brick 4 is missing, and comes later"
+    told = seqopt.replan(PLAN, at, missing=[1]).changes
+    assert told["broken"] == f"step {at + 1}: brick 1 is missing, and comes first"
     holds = next(s for s in PLAN.steps[at:] if s.grips[2] is not None)
     told = seqopt.replan(PLAN, at, lost=["rob3"]).changes
     assert told["broken"] == f"step {holds.number}: rob3 is lost"

@@ -173,6 +173,11 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
         row = builds[name].table.iloc[number - 1]
         for column, unit in (("M_sup_Nm", ""), ("F_max_N", ""), ("D_max_1e-3mm", " µm")):
             assert f">{row[column]:.6g}{unit}<" in text
+    table = builds["sequential"].table.assign(F_sup_N=3.33e-16)
+    noise = replace(builds["sequential"], table=table)
+    path.write_text(report_page(engine25, [noise], ""), "utf-8")
+    text, _ = shown(path, "step=12", PLAIN)
+    assert "<td>support force, N</td><td>0</td>" in text.replace(' class=""', "")
     broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
     path.write_text(broken, "utf-8")
     assert 'data-ready="true"' not in shown(path, words=PLAIN)[0]  # the control

@@ -18,6 +18,7 @@ from seqopt.network.network import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.report._gantt import gantt_picture
 from seqopt.report._style import look, looks, new_figure, picture_files, plain
+from seqopt.report.charts import front_figure
 from seqopt.report.comparison import compare
 from seqopt.report.draw import View, _drawing_order, draw_bricks, draw_grips
 from seqopt.scene.boxes import _boxes, box_corners
@@ -32,6 +33,18 @@ from tests.builders import six_bricks, small_arch
 @pytest.fixture(scope="module")
 def build(engine25):
     return GivenSequence(engine25, sequential(engine25.network), "sequential")
+
+
+def test_points_with_as_many_steps_have_one_color():
+    """One point was dark in all panels but the last, whose color bar had halves of steps."""
+    front = seqopt.pareto(small_arch(3), aim="F_largest,D_max,steps")
+    figure = front_figure(front, {})
+    dots = [each for axes in figure.axes for each in axes.collections if each.get_cmap()]
+    scales = {(each.norm.vmin, each.norm.vmax) for each in dots if each.get_array() is not None}
+    assert len(scales) == 1
+    ((low, high),) = scales
+    assert float(low).is_integer()
+    assert float(high).is_integer()
 
 
 def test_a_scene_draws_as_many_bricks_as_are_asked_for(arch25):

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from seqopt._cli.main import main
+from seqopt.arms import Arm
 from seqopt.contact.assembly import bare_assembly
 from seqopt.errors import FileError, SceneError, SceneWarning
 from seqopt.exchange._doubts import find_doubts
@@ -193,6 +194,15 @@ SCENE = six_bricks()
 
 
 with_own = partial(with_part, SCENE)
+
+
+def with_arm(**changes):
+    """Return the scene with a robot that has an arm of some unusual length."""
+    usual = {"position": (0.0, 1.5, 0.0), "tool_length": 0.3, "tool_radius": 0.05}
+    arm = Arm(urdf="package:arm.urdf", **usual | changes)
+    return SCENE.with_robots(Robot(name="rob1", payload=500.0, arm=arm))
+
+
 ODD = {
     "joint (2, 3): it lies 1e+06 m from brick 2": with_own("joints", 1, position=(1e6, 0.0, 0.0)),
     "ground end of brick 1: it lies": with_own("grounds", 0, position=(0.0, 3.0, 0.0)),
@@ -210,6 +220,21 @@ ODD = {
     "rob1: a reach of 1500 m looks like millimeters": SCENE.with_robots(
         Robot(name="rob1", payload=500.0, reach=Sphere(center=(0.0, 0.0, 0.0), radius=1500.0))
     ),
+    "gravity points away from every ground end; check its sign": replace(
+        SCENE, gravity=(0.0, 0.0, 9.81)
+    ),
+    "it is 1000 m long, which looks like millimeters": with_own(
+        "bricks", 5, position=(1000.0, 0.0, 0.0)
+    ),
+    "wind is 45 times the weight": replace(SCENE, wind=(45.0, 0.0, 0.0)),
+    "brick 2: dimensions of (0.00025, 0.00012, 5e-05) m are tiny": with_own(
+        "bricks", 1, dimensions=(0.00025, 0.00012, 0.00005)
+    ),
+    "rob1: a tool_length of 300 m looks like millimeters": with_arm(tool_length=300.0),
+    "rob1: a position of its arm of 1500 m looks": with_arm(position=(0.0, 1500.0, 0.0)),
+    "joint (1, 2): a thickness of 10 m looks like millimeters": with_own(
+        "joints", 0, thickness=10.0
+    ),
     "ground end of brick 1: a movement of 5 is m or rad": with_own(
         "grounds", 0, movement=(5.0, 0.0, 0.0)
     ),
@@ -226,7 +251,8 @@ def test_what_is_odd_is_named(capsys, tmp_path, said):
     assert any(said in str(warning.message) for warning in heard)
     assert main(["scene", str(path)]) == 0
     lines = capsys.readouterr().err.splitlines()
-    assert all(line.startswith("seqopt: warning: scene ") for line in lines)
+    said_of_arms = "robot rob1: package package is not installed"
+    assert all(line.startswith(("seqopt: warning: scene ", said_of_arms)) for line in lines)
     assert any(said in line for line in lines)
 
 

@@ -78,7 +78,7 @@ def test_further_robots_are_mobile():
     assert [robot.name for robot in with_robots(scene, 5).robots][3:] == ["rob4", "rob5"]
     assert len(with_robots(scene, 2).robots) == 2
     for count in (0, 6, 2.5):
-        with pytest.raises(StepError, match="one to 5"):
+        with pytest.raises(StepError, match="from 1 to 5"):
             with_robots(scene, count)
 
 

@@ -338,6 +338,9 @@ def test_the_worst_margin_of_the_steps_is_said():
     assert format_rows(rows_of(table)).endswith("proven 2 by cone program")
     table["friction_needed"] = [0.0, 0.25]
     assert format_rows(rows_of(table)).endswith("; friction: needs 0.25 at most (step 2)")
+    table["friction_needed"] = [np.nan, 0.25]
+    said = "; friction: needs 0.25 at most (step 2, not known of 1 steps)"
+    assert format_rows(rows_of(table)).endswith(said)
     table["friction_needed"] = [np.inf, 0.25]
     table["tilt_survived_deg"] = [7.0, 3.0]
     said = "; friction: no value is enough (step 1); tilt: survives 3° at least (step 2)"

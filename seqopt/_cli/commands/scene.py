@@ -7,6 +7,7 @@ from typing import Annotated
 from seqopt._cli.answer import Answer, scene_facts
 from seqopt._cli.signatures import Call
 from seqopt._cli.words import File
+from seqopt.arms._model import unread_models
 from seqopt.exchange._files import Output
 from seqopt.network._words import network_facts, scene_lines
 from seqopt.network.network import build_network
@@ -53,4 +54,5 @@ def run(
         save_scene(found, export)
         lines.append(f"written to {export}")
     written = () if export is None else (export,)
-    return Answer(facts={"scene": facts}, text="\n".join(lines), written=written)
+    notes = (*unread_models(found),)
+    return Answer(facts={"scene": facts}, text="\n".join(lines), written=written, notes=notes)

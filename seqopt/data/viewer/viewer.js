@@ -10,8 +10,8 @@
     props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
     optimized_robot: "robot whose grip is chosen",
   };
-  // numbers as people write them, and lengths, which are kept in µm
-  const plain = (v) => Number(v).toLocaleString("en-US", { maximumSignificantDigits: 6 });
+  // numbers as people write them, what is left of rounding as 0; and lengths, which are kept in µm
+  const plain = (v) => (Math.abs(v) < 1e-9 ? 0 : Number(v)).toLocaleString("en-US", { maximumSignificantDigits: 6 });
   const length = (v) => (Math.abs(v) >= 1000 ? `${plain(v / 1000)} mm` : `${plain(v)} µm`);
   const shownValue = (name, v) => (Number.isNaN(Number(v)) ? v : name.startsWith("D_") ? length(Number(v)) : plain(v));
   const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;

@@ -212,13 +212,13 @@ def _laid(form: ArchForm, count: int) -> tuple[float, Floats]:
     widest = THICKEST * min(form.dimensions)
     if left(0.0) < 0:
         raise SceneError(
-            f"arch: {count} bricks are longer than its curve; give fewer than {count}, or shorter "
-            "ones"
+            f"arch: {count} bricks, {lengths.sum():.4g} m together, are longer than its curve; "
+            "give shorter ones, or fewer"
         )
     if left(widest) > 0:
         raise SceneError(
             f"arch: joints between {count} bricks would be wider than {1e3 * widest:.3g} mm; give "
-            f"more than {count}, or longer ones"
+            "more of them, longer ones, or a smaller gap"
         )
     gap: float = optimize.brentq(left, 0.0, widest, xtol=_EXACT)
     points = _chords(line, lengths[:-1] + gap)

@@ -270,8 +270,8 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
 
 
 RISE = "arch: rise is 1.2 m; a circular arch rises at most half of its span, 1: give less"
-LONG = "arch: 40 bricks are longer than its curve; give fewer than 40"
-WIDE = "arch: joints between 5 bricks would be wider than 30 mm; give more than 5"
+LONG = "arch: 40 bricks, 8 m together, are longer than its curve; give shorter ones, or fewer"
+WIDE = "arch: joints between 5 bricks would be wider than 30 mm; give more of them"
 THICK = "arch:span=1,rise=0.5,bricks=7,dimensions=0.2x0.1x0.15"
 INTO = "arch of 7: bricks . and . interpenetrate by .* mm; give another number of bricks"
 APART = "vault:span=2,rise=0.8,columns=2,courses=25,dimensions=0.05x0.1x0.06,gap=0.06"
@@ -289,6 +289,8 @@ WRONG = {  # words, and what is said of them
     "arch:span=2,rise=1.2": RISE,
     "arch:span=2,rise=.7,bricks=40": LONG,
     "arch:span=2,rise=0.7,bricks=5": WIDE,
+    "arch:span=2,rise=0.7,dimensions=200x100x60": "arch: 2 bricks, 400 m together, are longer",
+    "arch:span=2,rise=0.7,gap=10": "wider than 30 mm; give more of them, longer ones, or a smaller",
     THICK: INTO,
     "arch:span=1e9,rise=7": "arch: .* bricks; give numbers that make at",
     "arch:span=1e300,rise=7": "numbers are too large; give smaller",
