@@ -22,15 +22,9 @@ from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.report._questions import report
-    from seqopt.report.comparison import (
-        Comparison,
-        compare,
-        format_comparison,
-        largest,
-        method_tables,
-    )
+    from seqopt.report.comparison import Comparison, compare, format_comparison, method_tables
 
-__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables", "report"]
+__all__ = ["Comparison", "compare", "format_comparison", "method_tables", "report"]
 __getattr__, __dir__ = later(
     __name__, dict.fromkeys(__all__, "comparison") | {"report": "_questions"}
 )

@@ -241,19 +241,9 @@ def _plans(
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
-    """Return the largest responses of any step of a table.
+    """Return the largest responses in a table of `seqopt.analyze`, by the names of `LARGEST`.
 
-    Parameters
-    ----------
-    scene : Scene
-        Whose robots the table is about.
-    table : pandas.DataFrame
-        From `seqopt.analyze`.
-
-    Returns
-    -------
-    dict of str to float
-        By the names of `LARGEST`, in its units; ``F_rob`` is the largest force of any grip.
+    In its units; ``F_rob`` is the largest force of any grip of the scene's robots.
     """
     forces = table[[force_column(robot) for robot in scene.robots]].abs()
     worst = {name: float(table[RESPONSES[name].column].max()) for name in [*LARGEST][1:]}
