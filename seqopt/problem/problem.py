@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from types import EllipsisType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from seqopt._registry import Shown, registered
 from seqopt.arrays import Floats
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
@@ -40,6 +42,9 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
+
+if TYPE_CHECKING:
+    from seqopt.scene.scenarios import Scenarios
 
 
 class Aim(Enum):
@@ -330,16 +335,28 @@ class Problem(Shown):
             return self.moves
         raise ProblemError("the free schedule has no open grips; it has states")
 
-    @classmethod
-    def asked(
-        cls, engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, **words: Any
+    def but(  # noqa: PLR0913  # what `seqopt.pose` takes
+        self,
+        *,
+        engine: Engine | EllipsisType = ...,
+        moves: Schedule | FreeRules | EllipsisType = ...,
+        criterion: Criterion | EllipsisType = ...,
+        goals: Sequence[Amount | str] | str | EllipsisType = ...,
+        limits: Sequence[Limit | Filter | Resource | str] | str | EllipsisType = ...,
+        budgets: Sequence[Budget | str] | str | EllipsisType = ...,
+        stands: Standing | Mortar | str | EllipsisType | None = ...,
+        scenarios: Scenarios | Sequence[Scene] | EllipsisType = ...,
+        over: RobustAim | str | EllipsisType = ...,
+        orders: Orders | str | EllipsisType | None = ...,
+        resources: Resources | EllipsisType = ...,
     ) -> Problem:
-        """Return the problem of keywords, values or words, as `seqopt.pose` takes them."""
-        return cls(engine, moves, criterion, **_in_values(words, engine))
+        """Return the problem with other values or words, as of `seqopt.pose`; ... keeps one.
 
-    def but(self, **words: Any) -> Problem:
-        """Return the problem with other values of keywords, values or words."""
-        return replace(self, **_in_values(words, self.engine))
+        Filters and resources of a path stand among ``limits``.
+        """
+        given = {name: value for name, value in locals().items() if value is not ...}
+        del given["self"]
+        return replace(self, **_in_values(given, given.get("engine", self.engine)))
 
     @property
     def says_range(self) -> bool:

@@ -281,7 +281,7 @@ def test_budgets_against_brute_force(name, examples):
 
 
 def valued(problem, name, **options):
-    return seqopt.solve(problem, name, **options).certificate.objective
+    return seqopt.solve(problem, name, options=options).certificate.objective
 
 
 @pytest.fixture(scope="module")
