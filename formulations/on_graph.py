@@ -322,7 +322,7 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     graph, goal = instance.asked, instance.goals[0]
     found = _least_tail(graph, goal, choose, watch) if goal.kind == TAIL else choose(graph, watch)
     if not found.path:
-        raise TimeUpError("no path was found yet; give more")
+        raise TimeUpError("no path was found yet; give more time")
     values = path_values(graph, found.path)[: graph.goals]
     if goal.kind == TAIL:
         values = (_target_sums(goal, np.array(values)),)
@@ -396,6 +396,9 @@ class OnGraph(Terse):
 
         def choose(graph: Graph, watch: Watch) -> Choice:
             found = self.choose(graph, watch, **options)
+            if not isinstance(found, Choice):
+                said = f"returned a {type(found).__name__}, not a Choice"
+                raise SolverError(f"formulation {self.name} {said}")
             if not (found.path or found.stopped or graph.ends[0]):
                 raise InfeasibleError("no path leads to an end")
             if found.path and not is_path(graph, found.path):

@@ -66,7 +66,7 @@ class Search:
     Parameters
     ----------
     options : mapping or sequence of str, optional
-        Options of the formulation, as width=10; or a mapping.
+        Options of the formulation, as width=10; in Python also a mapping.
     proof : bool, optional
         If not, with cascade or rank_search, compute only the responses that the search meets, about
         a fifth; how far the choice is from the optimum stays unknown.

@@ -48,6 +48,12 @@ class Run:
     explains: bool = True
     clock: Clock = field(default_factory=Clock)
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.time_limit, Real) or not self.time_limit >= 0:
+            raise ProblemError(f"time_limit is {short(self.time_limit)}; give seconds from 0")
+        if not (self.progress is None or callable(self.progress)):
+            raise ProblemError(f"progress is {short(self.progress)}; give a function")
+
     @property
     def left(self) -> float:
         """Time that the formulation has left, s."""

@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
-from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -180,8 +179,6 @@ def find(problem: States, formulation: Formulation, run: Run) -> Found:
 
 def check_run(formulation: Formulation, run: Run) -> dict[str, Any]:
     """Return the options of a run; a `ProblemError` if its formulation does not take its limits."""
-    if not isinstance(run.time_limit, Real) or not run.time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(run.time_limit)}; give seconds from 0")
     if isfinite(run.time_limit) and not (formulation.watched or "seconds" in formulation.options):
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
     return formulation.parse_options(run.options)
@@ -258,7 +255,8 @@ def walk(problem: States, watch: Watch) -> Solution:
         with _keep(resources.executor, resources.workers):
             while len(path) < space.levels:
                 if watch.over:
-                    raise TimeUpError(f"{watch.seconds:.3g} s: {_so_far(problem, path)}; give more")
+                    so_far = f"{watch.seconds:.3g} s: {_so_far(problem, path)}"
+                    raise TimeUpError(f"{so_far}; give more time")
                 costs, trail = _branches(problem, len(path), state)
                 if not np.isfinite(costs).any():
                     raise NothingFoundError(

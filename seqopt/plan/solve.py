@@ -24,14 +24,7 @@ from seqopt.plan.plan import Given, Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.criteria import Criterion
 from seqopt.problem.problem import WORST_PEAK, Aim, Budget, Orders, Problem, RobustAim, check_parts
-from seqopt.problem.requirements import (
-    LIMIT_TOLERANCE,
-    LINEAR_RANGE,
-    Filter,
-    Limit,
-    Resource,
-    require_parts,
-)
+from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, Resource
 from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
@@ -96,7 +89,6 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budget)
     """
     engine = simplest(engine)
-    require_parts(engine, moves, criterion)
     problem = Problem(engine, moves, criterion).but(
         goals=goals,
         limits=limits,

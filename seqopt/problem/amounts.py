@@ -73,11 +73,13 @@ class MoveArrays(NamedTuple):
     distances: Floats
 
 
-def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarray:
+def call(
+    what: str, function: Any, arrays: StateArrays | MoveArrays, kind: type | None = None
+) -> np.ndarray:
     """Return a user's function of states or moves, (n,); a `ProblemError` if it fails."""
     count = len(arrays.possible if isinstance(arrays, StateArrays) else arrays.regrips)
     try:
-        found = np.asarray(function(arrays))
+        found = np.asarray(function(arrays), dtype=kind)
     except Exception as error:  # foreign code may raise any error
         raise ProblemError(f"{what}: its function failed: {message_of(error)}") from error
     if found.shape != (count,):
@@ -87,11 +89,17 @@ def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarr
     return found
 
 
-def require_named(part: Any) -> None:
-    """Raise a `ProblemError` if a part has a name by which lists of words cannot ask for it."""
+def require_named(part: Any, *functions: str) -> None:
+    """Raise a `ProblemError` if words cannot ask for a part, or what it consists of is wrong."""
     name, kind = part.name, type(part).__name__.lower()
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ProblemError(f"{kind} {short(name)}: give a name without commas, by which to ask")
+    if isinstance(part.responses, str):
+        said = f"responses are {part.responses!r}; give names, as ('T_max',)"
+        raise ProblemError(f"{kind} {name}: {said}")
+    for each, given in ((each, getattr(part, each)) for each in functions):
+        if not (given is None or callable(given) or isinstance(given, tuple)):  # of functions
+            raise ProblemError(f"{kind} {name}: {each} is {short(given)}; give a function")
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,11 +159,7 @@ class Amount:
     check: Callable[[Any], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        require_named(self)
-        for part in ("states", "moves", "least", "show", "margins", "check"):
-            if not (getattr(self, part) is None or callable(getattr(self, part))):
-                given = short(getattr(self, part))
-                raise ProblemError(f"amount {self.name}: {part} is {given}; give a function")
+        require_named(self, "states", "moves", "twin", "least", "show", "margins", "check")
 
     def __str__(self) -> str:
         return self.name
@@ -183,7 +187,7 @@ class Amount:
         if self.name in BUILT_IN or isinstance(self.states, _Response):
             found: Floats = function(arrays)
             return found
-        values = call(f"amount {self.name}", function, arrays).astype(float)
+        values = call(f"amount {self.name}", function, arrays, float)
         if not (values >= 0).all():
             raise ProblemError(
                 f"amount {self.name}: a value is {values.min():.6g}; give numbers from zero"

@@ -32,6 +32,7 @@ from seqopt.problem.requirements import (
     _step_limits,
     as_limits,
     parse_limits,
+    require_parts,
 )
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.responses._tolerance import is_tolerance
@@ -356,7 +357,9 @@ class Problem(Shown):
         """
         given = {name: value for name, value in locals().items() if value is not ...}
         del given["self"]
-        return replace(self, **_in_values(given, given.get("engine", self.engine)))
+        parts = (given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion"))
+        require_parts(*parts)
+        return replace(self, **_in_values(given, given.get("engine", self.engine).network.scene))
 
     @property
     def says_range(self) -> bool:
@@ -376,11 +379,10 @@ class Problem(Shown):
         return {}
 
 
-def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
+def _in_values(words: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     """Return keywords with all words parsed into values."""
-    network = getattr(engine, "network", None)
-    if "limits" in words and isinstance(network, Network):  # else it is refused later
-        found = parse_limits(words["limits"], network.scene)
+    if "limits" in words:
+        found = parse_limits(words["limits"], scene)
         filters = tuple(each for each in found if isinstance(each, Filter))
         paths = tuple(each for each in found if isinstance(each, Resource))
         rest = [each for each in found if each not in (*filters, *paths)]
@@ -398,12 +400,19 @@ def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount,
     return tuple(goal for goals in each for goal in goals)
 
 
+def _scenes(given: object) -> tuple[Scene, ...]:
+    some = tuple(given) if isinstance(given, Sequence) else (None,)
+    if not all(isinstance(each, Scene) for each in some):
+        raise ProblemError(f"scenarios {short(given)}: give seqopt.scenarios(scene), or scenes")
+    return some
+
+
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
     "limits": as_limits,
     "budgets": parse_budgets,
     "stands": Standing.of,
-    "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
+    "scenarios": lambda given: _scenes(getattr(given, "scenes", given)),
     "over": parse_robust,
     "orders": lambda given: None if given is None else Orders.of(given),
 }

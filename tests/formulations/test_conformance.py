@@ -339,6 +339,15 @@ def test_an_assignment_needs_a_state_of_every_level():
             PROGRAMS[name].solve.choose(graph, Watch())
 
 
+@pytest.mark.parametrize("found", [None, (1, 2)])
+def test_what_is_no_choice_is_named(problem8, found):
+    own = on_graph("own", "says nothing", lambda graph, watch: found, aim=Aim.SUM)
+    kind = type(found).__name__
+    for asked in (problem8, seqopt.compile_instance(problem8)):
+        with pytest.raises(SolverError, match=f"formulation own returned a {kind}, not a Choice"):
+            seqopt.solve(asked, own)
+
+
 def test_how_much_is_enumerated_at_once(monkeypatch):
     free = tuple(np.zeros(2) for _ in range(3))
     problem = Costs(LayeredCosts(free, (np.zeros((1, 2)), np.eye(2), np.eye(2))))
