@@ -294,9 +294,8 @@ class Formulation:
         """Return options by name, each of the type of its default; raises `ProblemError`."""
         if isinstance(given, str) or not isinstance(given, Mapping | Sequence):
             raise ProblemError(f"options {short(given)}: give {{'width': 10}} or ['width=10'], say")
-        known, words = self.options, () if isinstance(given, Mapping) else given
-        out: dict[str, Any] = {n: v for n, _, v in (str(each).partition("=") for each in words)}
-        out |= given if isinstance(given, Mapping) else {}
+        known, are_words = self.options, not isinstance(given, Mapping)
+        out = dict[str, Any]([str(w).partition("=")[::2] for w in given] if are_words else given)
         for name, value in out.items():
             where = f"option {name}={value if isinstance(value, str) else short(value)}"
             if name not in known:

@@ -94,9 +94,8 @@ def require_named(part: Any, *functions: str) -> None:
     name, kind = part.name, type(part).__name__.lower()
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ProblemError(f"{kind} {short(name)}: give a name without commas, by which to ask")
-    if isinstance(part.responses, str):
-        said = f"responses are {part.responses!r}; give names, as ('T_max',)"
-        raise ProblemError(f"{kind} {name}: {said}")
+    if isinstance(given := getattr(part, "responses", ()), str):
+        raise ProblemError(f"{kind} {name}: responses are {given!r}; give names, as ('T_max',)")
     for each, given in ((each, getattr(part, each)) for each in functions):
         if not (given is None or callable(given) or isinstance(given, tuple)):  # of functions
             raise ProblemError(f"{kind} {name}: {each} is {short(given)}; give a function")
