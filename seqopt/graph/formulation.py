@@ -294,8 +294,9 @@ class Formulation:
         """Return options by name, each of the type of its default; raises `ProblemError`."""
         if isinstance(given, str) or not isinstance(given, Mapping | Sequence):
             raise ProblemError(f"options {short(given)}: give {{'width': 10}} or ['width=10'], say")
-        known, are_words = self.options, not isinstance(given, Mapping)
-        out = dict[str, Any]([str(w).partition("=")[::2] for w in given] if are_words else given)
+        if not isinstance(given, Mapping):
+            given = dict(str(word).partition("=")[::2] for word in given)
+        known, out = self.options, dict(given)
         for name, value in out.items():
             where = f"option {name}={value if isinstance(value, str) else short(value)}"
             if name not in known:

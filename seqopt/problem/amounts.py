@@ -204,12 +204,13 @@ class Amount:
 
 @dataclass(frozen=True)
 class _Response:
-    """The values of a response."""
+    """The values of a response, of a total zero where it is below: all compressed is no tension."""
 
     name: str
+    least: float = -np.inf
 
     def __call__(self, states: StateArrays) -> Floats:
-        return states.responses[self.name]
+        return np.maximum(states.responses[self.name], self.least)
 
 
 @dataclass(frozen=True)
@@ -229,14 +230,6 @@ def _costs(states: StateArrays) -> Floats:
 def _tolerated(value: float) -> float:
     """Return a tolerance, m, from its reciprocal."""
     return 1 / value if 0 < value < NO_TOLERANCE else 0.0 if value else np.inf
-
-
-@dataclass(frozen=True)
-class _Size(_Response):
-    """The values of a response, zero where it is below: all compressed is no tension."""
-
-    def __call__(self, states: StateArrays) -> Floats:
-        return np.maximum(super().__call__(states), 0.0)
 
 
 def worst(response: str) -> Amount:
@@ -286,7 +279,7 @@ REGRIPS = Amount("regrips", moves=attrgetter("regrips"))
 TRAVEL = Amount("travel", moves=attrgetter("distances"), unit="m", needs_stays=True)
 _SHOWN = {"tilt": _tilt_survived}
 _BOUNDS = [Amount(n, margins=_Margin(n), is_peak=True, show=_SHOWN.get(n)) for n in MARGINS]
-_TOTALS = [Amount(f"sum({n})", _Size(n), responses=(n,)) for n in (*OFFERED, LARGEST)]
+_TOTALS = [Amount(f"sum({n})", _Response(n, 0.0), responses=(n,)) for n in (*OFFERED, LARGEST)]
 _EVERY = (MINMAX, SUM, STEPS, REGRIPS, TRAVEL, *map(worst, STATE_RESPONSES), *_BOUNDS, *_TOTALS)
 BUILT_IN = {amount.name: amount for amount in _EVERY}
 """Amounts that are always there, by name."""

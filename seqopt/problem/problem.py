@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -30,7 +30,6 @@ from seqopt.problem.requirements import (
     Resource,
     _prop_limits,
     _step_limits,
-    as_limits,
     parse_limits,
     require_parts,
 )
@@ -357,9 +356,9 @@ class Problem(Shown):
         """
         given = {name: value for name, value in locals().items() if value is not ...}
         del given["self"]
-        parts = (given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion"))
+        parts = [given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion")]
         require_parts(*parts)
-        return replace(self, **_in_values(given, given.get("engine", self.engine).network.scene))
+        return replace(self, **_in_values(given, parts[0].network.scene))
 
     @property
     def says_range(self) -> bool:
@@ -379,14 +378,12 @@ class Problem(Shown):
         return {}
 
 
-def _in_values(words: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
+def _in_values(words: dict[str, Any], scene: Scene) -> dict[str, Any]:
     """Return keywords with all words parsed into values."""
     if "limits" in words:
         found = parse_limits(words["limits"], scene)
-        filters = tuple(each for each in found if isinstance(each, Filter))
-        paths = tuple(each for each in found if isinstance(each, Resource))
-        rest = [each for each in found if each not in (*filters, *paths)]
-        words = {**words, "limits": rest, "filters": filters, "paths": paths}
+        for name, kind in (("limits", Limit), ("filters", Filter), ("paths", Resource)):
+            words[name] = tuple(each for each in found if isinstance(each, kind))
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
@@ -401,7 +398,8 @@ def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount,
 
 
 def _scenes(given: object) -> tuple[Scene, ...]:
-    some = tuple(given) if isinstance(given, Sequence) else (None,)
+    some = getattr(given, "scenes", given)
+    some = tuple(some) if isinstance(some, Sequence) else (None,)
     if not all(isinstance(each, Scene) for each in some):
         raise ProblemError(f"scenarios {short(given)}: give seqopt.scenarios(scene), or scenes")
     return some
@@ -409,10 +407,9 @@ def _scenes(given: object) -> tuple[Scene, ...]:
 
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
-    "limits": as_limits,
     "budgets": parse_budgets,
     "stands": Standing.of,
-    "scenarios": lambda given: _scenes(getattr(given, "scenes", given)),
+    "scenarios": _scenes,
     "over": parse_robust,
     "orders": lambda given: None if given is None else Orders.of(given),
 }
