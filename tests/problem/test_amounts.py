@@ -210,7 +210,7 @@ BUDGETS = {
 NO_BUDGETS = {
     "bricks=40": "does not exist; give travel=3.5m, .* travel=0.8",
     "travle=3m": "did you mean travel",
-    "travel=3s": "give travel=NUMBERm",
+    "travel=3s": "give it as travel=3m",
     "steps_over:T_max=80:3m": "name what is counted, a level and a number of steps",
     "regrips=few": "'few' is not a number from 0",
     5: "as words",
