@@ -89,7 +89,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
         return stop
     if str(stop) == "memory":
         return ProblemError("max_memory: it is too little to find a plan; give more")
-    return TimeUpError("no plan was found yet; give more")
+    return TimeUpError("no plan was found yet; give more time")
 
 
 def after_margins(problem: States, search: Search, tell: Watching) -> Solution:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -322,7 +323,7 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     graph, goal = instance.asked, instance.goals[0]
     found = _least_tail(graph, goal, choose, watch) if goal.kind == TAIL else choose(graph, watch)
     if not found.path:
-        raise TimeUpError("no path was found yet; give more")
+        raise TimeUpError("no path was found yet; give more time")
     values = path_values(graph, found.path)[: graph.goals]
     if goal.kind == TAIL:
         values = (_target_sums(goal, np.array(values)),)
@@ -377,6 +378,21 @@ class OnGraph(Terse):
         found = inspect.signature(self.choose).parameters
         return {n: p for n, p in found.items() if p.kind is inspect.Parameter.KEYWORD_ONLY}
 
+    def _checked(self, graph: Graph, watch: Watch, **options: Any) -> Choice:
+        """Return the choice, which is one; a path leads along moves from the start to an end."""
+        found: object = self.choose(graph, watch, **options)
+        if not isinstance(found, Choice):
+            kind = type(found).__name__
+            raise SolverError(f"formulation {self.name} returned a {kind}, not a Choice")
+        if not (found.path or found.stopped or graph.ends[0]):
+            raise InfeasibleError("no path leads to an end")
+        if found.path and not is_path(graph, found.path):
+            raise SolverError(
+                f"formulation {self.name}: its path does not lead along moves of the graph from "
+                "the start to an end"
+            )
+        return found
+
     def __call__(
         self,
         problem: Any,
@@ -393,18 +409,7 @@ class OnGraph(Terse):
         """
         watch = watch or Watch(seconds)
         watch.memory = min(watch.memory, max_memory)
-
-        def choose(graph: Graph, watch: Watch) -> Choice:
-            found = self.choose(graph, watch, **options)
-            if not (found.path or found.stopped or graph.ends[0]):
-                raise InfeasibleError("no path leads to an end")
-            if found.path and not is_path(graph, found.path):
-                raise SolverError(
-                    f"formulation {self.name}: its path does not lead along moves of the graph "
-                    "from the start to an end"
-                )
-            return found
-
+        choose = partial(self._checked, **options)
         if not has_scene(problem):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")

@@ -53,7 +53,7 @@ def solve(
             raise
         stopped = "interrupt"
     if stopped and not plans:
-        raise TimeUpError("no plan was found yet; give more")
+        raise TimeUpError("no plan was found yet; give more time")
     return tuple(replace(plan, stopped=stopped) for plan in plans)
 
 

@@ -66,7 +66,7 @@ class Search:
     Parameters
     ----------
     options : mapping or sequence of str, optional
-        Options of the formulation, as width=10; or a mapping.
+        Options of the formulation, as width=10; in Python also a mapping.
     proof : bool, optional
         If not, with cascade or rank_search, compute only the responses that the search meets, about
         a fifth; how far the choice is from the optimum stays unknown.
@@ -98,24 +98,9 @@ class Search:
     max_memory: float | str | None = None
 
     def parse_options(self, formulation: Formulation) -> dict[str, Any]:
-        """Return the options of a formulation; words are typed by those of its ``solve``."""
-        known, given = formulation.options, self.options
-        worded = () if isinstance(given, Mapping) else given
-        out: dict[str, Any] = {n: v for n, _, v in (each.partition("=") for each in worded)}
-        out |= given if isinstance(given, Mapping) else {}
-        for name, value in out.items():
-            where = f"option {name}={value}"
-            if isinstance(value, str) and name not in known:
-                hint, names = did_you_mean(name, known), ", ".join(known) or "no options"
-                raise ProblemError(f"{where}: {formulation.name} has {names}{hint}")
-            if isinstance(value, str) and not isinstance(known[name], str):
-                kind = type(known[name])
-                try:
-                    out[name] = kind(value)
-                except ValueError:
-                    text = f"{name} is {value!r}; give an {kind.__name__}"
-                    raise ProblemError(f"{where}: {text}") from None
-        if self.max_memory is not None and "max_memory" in known:
+        """Return the options of a formulation, and the memory if it takes one."""
+        out = formulation.parse_options(self.options)
+        if self.max_memory is not None and "max_memory" in formulation.options:
             out["max_memory"] = self.memory
         return out
 

@@ -263,6 +263,32 @@ def private_imports(page: str) -> list[str]:
     return [line for line in lines if re.search(r"[. ,]_[a-z]", line)]
 
 
+# its signature has the options of what it chooses by
+FORWARDED = ["formulations.on_graph.OnGraph.__call__"]
+
+
+def open_keywords(module: str, tree: ast.Module) -> list[str]:
+    """Return the functions and methods that others may call with keywords of any name."""
+    classes = [part for part in tree.body if isinstance(part, ast.ClassDef)]
+    owned = [(f"{module}.{each.name}", each.body) for each in classes] + [(module, tree.body)]
+    return [
+        f"{owner}.{part.name}"
+        for owner, body in owned
+        for part in body
+        if isinstance(part, ast.FunctionDef) and part.args.kwarg
+        if not re.search(r"\._(?!_)", f"{owner}.{part.name}")
+    ]
+
+
+def test_every_keyword_of_what_is_public_has_a_name():
+    one = ast.parse("class A:\n    def f(self, **k): ...\n    def _g(self, **k): ...")
+    assert open_keywords("a.b", one) == ["a.b.A.f"]
+    assert open_keywords("a._b", one) == []
+    files = [*sources("seqopt"), *sources("formulations")]
+    found = [name for path in files for name in open_keywords(dotted(path), parsed(path))]
+    assert found == FORWARDED
+
+
 def test_pages_use_what_is_public():
     assert len(private_imports("from seqopt import _a\n>>> import seqopt.a._b\nimport seqopt")) == 2
     pages = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}

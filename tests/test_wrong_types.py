@@ -58,8 +58,8 @@ def test_what_is_meant_is_taken(tmp_path):
     for given in ("overlap_dp", own):
         assert seqopt.solve(PROBLEM, given).certificate.gap == 0.0
     assert (
-        seqopt.solve(PROBLEM, "beam", width=3).choice
-        == seqopt.solve(PROBLEM, "beam", width=np.int64(3)).choice
+        seqopt.solve(PROBLEM, "beam", options={"width": 3}).choice
+        == seqopt.solve(PROBLEM, "beam", options={"width": np.int64(3)}).choice
     )
     worded = seqopt.optimize(SCENE, formulation="beam", search=seqopt.Search(options=["width=3"]))
     assert worded.choice == seqopt.optimize(SCENE, formulation="beam", search=WIDE).choice
@@ -115,6 +115,22 @@ WRONG = {
     "'weighted' is no criterion": lambda: seqopt.pose(ENGINE, LOOP, "weighted"),
     "a Schedule is not a problem": lambda: seqopt.solve(LOOP, "overlap_dp"),
     "a int is not a formulation": lambda: seqopt.solve(PROBLEM, 3),
+    "option width=2.5: width is 2.5; give a whole number": lambda: beam({"width": 2.5}),
+    "option width=True: width is True; give a whole number": lambda: beam({"width": True}),
+    "option width=x: width is 'x'; give a whole number": lambda: beam(["width=x"]),
+    "widht=3: beam has width, seconds, max_memory (did you mean width?)": lambda: beam(
+        {"widht": 3}
+    ),
+    "options 'width=3': give {'width': 10} or ['width=10']": lambda: beam("width=3"),
+    "options 3: give {'width': 10}": lambda: beam(3),
+    "'free' is no schedule; take one of": lambda: PROBLEM.but(moves="free"),
+    "'weighted' is no criterion; take": lambda: PROBLEM.but(criterion="weighted"),
+    "'frame' is no engine; take one of": lambda: PROBLEM.but(engine="frame"),
+    "scenarios 3: give seqopt.scenarios": lambda: PROBLEM.but(scenarios=3),
+    "scenarios [3]: give seqopt.scenarios": lambda: PROBLEM.but(scenarios=[3]),
+    "time_limit is '5s'; give seconds from 0": lambda: seqopt.solve(PROBLEM, time_limit="5s"),
+    "progress is 3; give a function": lambda: seqopt.solve(PROBLEM, progress=3),
+    "workers is 0; give a whole number": lambda: seqopt.sweep([SCENE], workers=0),
     "a Network is not an engine": lambda: seqopt.analyze(NETWORK, seqopt.sequential(NETWORK)),
     "a Schedule is not a sequence of steps": lambda: seqopt.analyze(ENGINE, LOOP),
     "limit 3 of 'much'": lambda: seqopt.Limit(3, "much"),
@@ -124,6 +140,10 @@ WRONG = {
         **{k: v for k, v in vars(SCENE).items() if k in SCENE.__dataclass_fields__} | {"bricks": 3}
     ),
 }
+
+
+def beam(options):
+    seqopt.solve(PROBLEM, "beam", options=options)
 
 
 @pytest.mark.parametrize("said", WRONG)

@@ -250,16 +250,16 @@ def _by_then(
 ) -> Solution:
     """Return the incumbent with its makespan; raise an error if none is within the budgets."""
     if problem.paths:
-        raise TimeUpError("no plan within all resources was found yet; give more") from None
+        raise TimeUpError("no plan within all resources was found yet; give more time") from None
     found = plan_by_then(first, stop)
     soonest = waits.soonest(problem, found.states)
     if soonest is None:
-        raise TimeUpError("no plan that stands while mortar cures was found yet; give more")
+        raise TimeUpError("no plan that stands while mortar cures was found yet; give more time")
     pairs = zip(problem.goals, found.objective, strict=False)
     values = tuple(soonest.makespan if goal.in_time else value for goal, value in pairs)
     for value, cap in zip(values[len(problem.aims) :], problem.budgets, strict=True):
         if value > tied(cap):
-            raise TimeUpError("no plan within all budgets was found yet; give more")
+            raise TimeUpError("no plan within all budgets was found yet; give more time")
     return replace(
         found, objective=values, grips=soonest.grips, starts=soonest.starts, ends=soonest.makespan
     )

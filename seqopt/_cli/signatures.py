@@ -222,6 +222,7 @@ class Signature:
     def _help(self, option: Option, text: str) -> str:
         """Return the help of an option, with its names and default."""
         text = self._spoken(text).removesuffix(".")
+        text = text.removeprefix("If not, ") if option.flag.startswith("--no-") else text
         if text[1:2].islower() or text[1:2] == " ":
             text = text[:1].lower() + text[1:]
         names = option.more.get("names", lambda: option.choices if option.name in VALUES else ())()

@@ -176,7 +176,7 @@ def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
         met = widening(Joint(graph, [sums]), most, none, until, LABELS, any_path=True)
         path = _path(graph, met.arcs)
         if path is None and until.over:
-            raise TimeUpError("no path within all caps was found yet; give more")
+            raise TimeUpError("no path within all caps was found yet; give more time")
         if path is None and np.isfinite(met.bound):
             raise NothingFoundError(
                 "mixtures of plans are within all budgets, and no plan was found that is; raise one"

@@ -6,16 +6,18 @@ import inspect
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint
+from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Order
 from seqopt.work import Clock
 
@@ -42,9 +44,15 @@ class Run:
     time_limit: float = math.inf
     progress: Callable[[Any], object] | None = None
     proof: bool = True
-    options: dict[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] | Sequence[str] = field(default_factory=dict)
     explains: bool = True
     clock: Clock = field(default_factory=Clock)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.time_limit, Real) or not self.time_limit >= 0:
+            raise ProblemError(f"time_limit is {short(self.time_limit)}; give seconds from 0")
+        if not (self.progress is None or callable(self.progress)):
+            raise ProblemError(f"progress is {short(self.progress)}; give a function")
 
     @property
     def left(self) -> float:
@@ -170,6 +178,13 @@ class Watch:
 
 
 LEAST = {Aim.SUM: "sum", Aim.PEAK: "largest"}
+READ: dict[type, tuple[Callable[[str], Any], type, str]] = {
+    bool: (lambda word: {"true": True, "false": False}[word.lower()], bool, "true or false"),
+    int: (int, Integral, "a whole number"),
+    float: (float, Real, "a number"),
+    str: (str, str, "a word"),
+}
+"""By the type of an option's default: how words are read, its type, and what is accepted."""
 
 
 QUESTIONS = {
@@ -275,12 +290,26 @@ class Formulation:
             and isinstance(parameter.default, int | float | str)
         }
 
-    def require_options(self, given: Iterable[str]) -> None:
-        """Raise a `ProblemError` that names the first option which is not of this formulation."""
-        for name in given:
-            if name not in self.options:
-                known = ", ".join(self.options) or "no options"
-                raise ProblemError(f"option {name}: {self.name} has {known}")
+    def parse_options(self, given: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
+        """Return options by name, each of the type of its default; raises `ProblemError`."""
+        if isinstance(given, str) or not isinstance(given, Mapping | Sequence):
+            raise ProblemError(f"options {short(given)}: give {{'width': 10}} or ['width=10'], say")
+        if not isinstance(given, Mapping):
+            given = dict(str(word).partition("=")[::2] for word in given)
+        known, out = self.options, dict(given)
+        for name, value in out.items():
+            where = f"option {name}={value if isinstance(value, str) else short(value)}"
+            if name not in known:
+                hint, names = did_you_mean(name, known), ", ".join(known) or "no options"
+                raise ProblemError(f"{where}: {self.name} has {names}{hint}")
+            read, kind, wanted = READ[type(known[name])]
+            if isinstance(value, str):
+                with suppress(KeyError, ValueError):
+                    out[name] = read(value)
+            said = out[name]
+            if not isinstance(said, kind) or isinstance(said, bool) is not (kind is bool):
+                raise ProblemError(f"{where}: {name} is {short(value)}; give {wanted}")
+        return out
 
     @property
     def watched(self) -> bool:

@@ -71,8 +71,8 @@ def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
 
     On an interrupt the formulation returns its incumbent; `KeyboardInterrupt` if there is none yet.
     """
-    check_run(formulation, run)
-    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
+    options = check_run(formulation, run)
+    watch = Watch(min(run.left, options.get("seconds", inf)), run.progress)
     seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
         selection = _choose_path(instance, formulation, run, watch)
@@ -89,7 +89,8 @@ def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: 
     name = formulation.name
     limit: dict[str, Any] = {} if run.left == inf else {"seconds": run.left}
     limit = {"watch": watch} if formulation.watched else limit
-    solve = partial(formulation.solve, deepcopy(instance), **run.options, **limit)
+    limit |= formulation.parse_options(run.options)
+    solve = partial(formulation.solve, deepcopy(instance), **limit)
     try:
         with _answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, Solution, solve)

@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
-from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -149,15 +148,15 @@ def find(problem: States, formulation: Formulation, run: Run) -> Found:
     Raises `InfeasibleError`, which says why, if no choice is feasible; `ProblemError` if graph,
     formulation and options are incompatible; `SolverError` if the answer fails its check.
     """
-    check_run(formulation, run)
+    options = check_run(formulation, run)
     start = time.perf_counter()
     reported: dict[str, Any] = {} if run.progress is None else {"progress": run.progress}
-    watch = Watch(min(run.left, run.options.get("seconds", inf)), run.progress)
+    watch = Watch(min(run.left, options.get("seconds", inf)), run.progress)
     limit = {"watch": watch} if formulation.watched else {"seconds": run.left}
     limit = limit if formulation.watched or isfinite(run.left) else {}
     with _keep(problem.resources.executor, problem.resources.workers):
         with run.clock.needed("finding a first plan"):
-            options = {**run.options, **reported, **limit}
+            options = {**options, **reported, **limit}
             selection = _choose_states(formulation, problem, options, run)
         stopped = run.clock.why(selection.stopped)
         selection = replace(selection, stopped=stopped, trace=watch.trace)
@@ -178,13 +177,11 @@ def find(problem: States, formulation: Formulation, run: Run) -> Found:
     return Found(selection, certificate, steps, seconds)
 
 
-def check_run(formulation: Formulation, run: Run) -> None:
-    """Raise a `ProblemError` if a formulation does not take the limits and options of a run."""
-    if not isinstance(run.time_limit, Real) or not run.time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(run.time_limit)}; give seconds from 0")
+def check_run(formulation: Formulation, run: Run) -> dict[str, Any]:
+    """Return the options of a run; a `ProblemError` if its formulation does not take its limits."""
     if isfinite(run.time_limit) and not (formulation.watched or "seconds" in formulation.options):
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
-    formulation.require_options(run.options)
+    return formulation.parse_options(run.options)
 
 
 def _proven(
@@ -220,7 +217,8 @@ def _choose_states(
     if barred(problem) is not None:  # what every plan passes is asked before any is sought
         raise INFEASIBLE.confirmed(replace(problem), name, limit, explain=run.explains)
     alone, rules = formulation.window_options, problem.rules
-    walks = not run.proof and alone is not None and run.options in ({}, alone)
+    walks = not run.proof and alone is not None
+    walks &= formulation.parse_options(run.options) in ({}, alone)
     beside = problem.scenarios or problem.budgets or problem.demands or problem.paths
     walks &= all(goal.of_criterion for goal in problem.aims) and not beside
     if walks and rules.names_robots():
@@ -257,7 +255,8 @@ def walk(problem: States, watch: Watch) -> Solution:
         with _keep(resources.executor, resources.workers):
             while len(path) < space.levels:
                 if watch.over:
-                    raise TimeUpError(f"{watch.seconds:.3g} s: {_so_far(problem, path)}; give more")
+                    so_far = f"{watch.seconds:.3g} s: {_so_far(problem, path)}"
+                    raise TimeUpError(f"{so_far}; give more time")
                 costs, trail = _branches(problem, len(path), state)
                 if not np.isfinite(costs).any():
                     raise NothingFoundError(

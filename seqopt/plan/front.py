@@ -178,9 +178,8 @@ class Front(Terse):
     def __repr__(self) -> str:
         whole = "complete" if self.complete else "not complete"
         outside = f"{OUTSIDE}: " * any(map(leaves, self.moved))
-        return (
-            f"<Front: {outside}{len(self.table)} plans, {whole}; {', '.join(map(str, self.table))}>"
-        )
+        plans = f"{len(self.table)} plan{'s' * (len(self.table) != 1)}"
+        return f"<Front: {outside}{plans}, {whole}; {', '.join(map(str, self.table))}>"
 
 
 def find_front(
@@ -208,7 +207,7 @@ def find_front(
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
     >>> worst = seqopt.CRITERIA["worst-ratio"]
     >>> find_front(seqopt.pose(engine, seqopt.FreeRules(), worst, "F_largest,steps"))
-    <Front: 1 plans, complete; F_largest, steps, regrips>
+    <Front: 1 plan, complete; F_largest, steps, regrips>
     """
     formulation = as_formulation(formulation, "front")
     if not isinstance(problem, Problem):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,8 +23,8 @@ from seqopt.graph.states import States, build_states, over_scenarios, within
 from seqopt.plan.plan import Given, Plan
 from seqopt.problem.amounts import MINMAX, SUM, Amount
 from seqopt.problem.criteria import Criterion
-from seqopt.problem.problem import WORST_PEAK, Aim, Orders, Problem, RobustAim, check_parts
-from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, require_parts
+from seqopt.problem.problem import WORST_PEAK, Aim, Budget, Orders, Problem, RobustAim, check_parts
+from seqopt.problem.requirements import LIMIT_TOLERANCE, LINEAR_RANGE, Filter, Limit, Resource
 from seqopt.responses._grip_sets import HERE, Moved, Resources, most_moved
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, _require_buildable
@@ -47,10 +47,10 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     engine: Engine,
     moves: Schedule | FreeRules,
     criterion: Criterion,
-    goals: Sequence[Amount] | str = (),
-    limits: Sequence[Limit | Filter | str] | str = (),
+    goals: Sequence[Amount | str] | str = (),
+    limits: Sequence[Limit | Filter | Resource | str] | str = (),
     *,
-    budgets: Sequence[str] | str = (),
+    budgets: Sequence[Budget | str] | str = (),
     stands: Standing | Mortar | str | None = None,
     scenarios: Scenarios | Sequence[Scene] = (),
     over: RobustAim | str = WORST_PEAK,
@@ -88,11 +88,17 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
     Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budget)
     """
-    asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
-    worlds = {"scenarios": scenarios, "over": over, "orders": orders}
     engine = simplest(engine)
-    require_parts(engine, moves, criterion)
-    problem = Problem.asked(engine, moves, criterion, **asked, **worlds, resources=resources)
+    problem = Problem(engine, moves, criterion).but(
+        goals=goals,
+        limits=limits,
+        budgets=budgets,
+        stands=stands,
+        scenarios=scenarios,
+        over=over,
+        orders=orders,
+        resources=resources,
+    )
     posed = replace(problem, criterion=graph_of(problem).criterion)  # with the scene's numbers
     posed.graphs.update(problem.graphs)
     return posed
@@ -181,7 +187,7 @@ def solve(
     proof: bool = True,
     time_limit: float = math.inf,
     progress: Callable[[Any], object] | None = None,
-    **options: Any,
+    options: Mapping[str, Any] | Sequence[str] = (),
 ) -> Plan:
     """Solve a problem by a formulation and check the answer from the problem's own data.
 
@@ -199,8 +205,8 @@ def solve(
         interrupt of the proof leaves that out: values and bounds are then claimed.
     progress : callable, optional
         Called with every better choice and bound as it is found, or with a few words.
-    **options
-        Options of the formulation.
+    options : mapping or sequence of str, optional
+        Options of the formulation, as ``{"width": 10}`` or ``["width=10"]``.
 
     Returns
     -------

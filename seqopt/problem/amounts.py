@@ -73,11 +73,13 @@ class MoveArrays(NamedTuple):
     distances: Floats
 
 
-def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarray:
+def call(
+    what: str, function: Any, arrays: StateArrays | MoveArrays, kind: type | None = None
+) -> np.ndarray:
     """Return a user's function of states or moves, (n,); a `ProblemError` if it fails."""
     count = len(arrays.possible if isinstance(arrays, StateArrays) else arrays.regrips)
     try:
-        found = np.asarray(function(arrays))
+        found = np.asarray(function(arrays), dtype=kind)
     except Exception as error:  # foreign code may raise any error
         raise ProblemError(f"{what}: its function failed: {message_of(error)}") from error
     if found.shape != (count,):
@@ -87,11 +89,16 @@ def call(what: str, function: Any, arrays: StateArrays | MoveArrays) -> np.ndarr
     return found
 
 
-def require_named(part: Any) -> None:
-    """Raise a `ProblemError` if a part has a name by which lists of words cannot ask for it."""
+def require_named(part: Any, *functions: str) -> None:
+    """Raise a `ProblemError` if words cannot ask for a part, or what it consists of is wrong."""
     name, kind = part.name, type(part).__name__.lower()
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ProblemError(f"{kind} {short(name)}: give a name without commas, by which to ask")
+    if isinstance(given := getattr(part, "responses", ()), str):
+        raise ProblemError(f"{kind} {name}: responses are {given!r}; give names, as ('T_max',)")
+    for each, given in ((each, getattr(part, each)) for each in functions):
+        if not (given is None or callable(given) or isinstance(given, tuple)):  # of functions
+            raise ProblemError(f"{kind} {name}: {each} is {short(given)}; give a function")
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,11 +158,7 @@ class Amount:
     check: Callable[[Any], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        require_named(self)
-        for part in ("states", "moves", "least", "show", "margins", "check"):
-            if not (getattr(self, part) is None or callable(getattr(self, part))):
-                given = short(getattr(self, part))
-                raise ProblemError(f"amount {self.name}: {part} is {given}; give a function")
+        require_named(self, "states", "moves", "twin", "least", "show", "margins", "check")
 
     def __str__(self) -> str:
         return self.name
@@ -183,7 +186,7 @@ class Amount:
         if self.name in BUILT_IN or isinstance(self.states, _Response):
             found: Floats = function(arrays)
             return found
-        values = call(f"amount {self.name}", function, arrays).astype(float)
+        values = call(f"amount {self.name}", function, arrays, float)
         if not (values >= 0).all():
             raise ProblemError(
                 f"amount {self.name}: a value is {values.min():.6g}; give numbers from zero"
@@ -201,12 +204,13 @@ class Amount:
 
 @dataclass(frozen=True)
 class _Response:
-    """The values of a response."""
+    """The values of a response, of a total zero where it is below: all compressed is no tension."""
 
     name: str
+    least: float = -np.inf
 
     def __call__(self, states: StateArrays) -> Floats:
-        return states.responses[self.name]
+        return np.maximum(states.responses[self.name], self.least)
 
 
 @dataclass(frozen=True)
@@ -226,14 +230,6 @@ def _costs(states: StateArrays) -> Floats:
 def _tolerated(value: float) -> float:
     """Return a tolerance, m, from its reciprocal."""
     return 1 / value if 0 < value < NO_TOLERANCE else 0.0 if value else np.inf
-
-
-@dataclass(frozen=True)
-class _Size(_Response):
-    """The values of a response, zero where it is below: all compressed is no tension."""
-
-    def __call__(self, states: StateArrays) -> Floats:
-        return np.maximum(super().__call__(states), 0.0)
 
 
 def worst(response: str) -> Amount:
@@ -283,7 +279,7 @@ REGRIPS = Amount("regrips", moves=attrgetter("regrips"))
 TRAVEL = Amount("travel", moves=attrgetter("distances"), unit="m", needs_stays=True)
 _SHOWN = {"tilt": _tilt_survived}
 _BOUNDS = [Amount(n, margins=_Margin(n), is_peak=True, show=_SHOWN.get(n)) for n in MARGINS]
-_TOTALS = [Amount(f"sum({n})", _Size(n), responses=(n,)) for n in (*OFFERED, LARGEST)]
+_TOTALS = [Amount(f"sum({n})", _Response(n, 0.0), responses=(n,)) for n in (*OFFERED, LARGEST)]
 _EVERY = (MINMAX, SUM, STEPS, REGRIPS, TRAVEL, *map(worst, STATE_RESPONSES), *_BOUNDS, *_TOTALS)
 BUILT_IN = {amount.name: amount for amount in _EVERY}
 """Amounts that are always there, by name."""

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from types import EllipsisType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from seqopt._registry import Shown, registered
 from seqopt.arrays import Floats
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
@@ -28,8 +30,8 @@ from seqopt.problem.requirements import (
     Resource,
     _prop_limits,
     _step_limits,
-    as_limits,
     parse_limits,
+    require_parts,
 )
 from seqopt.responses._grip_sets import HERE, Resources
 from seqopt.responses._tolerance import is_tolerance
@@ -40,6 +42,9 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.standing import Standing
+
+if TYPE_CHECKING:
+    from seqopt.scene.scenarios import Scenarios
 
 
 class Aim(Enum):
@@ -330,16 +335,30 @@ class Problem(Shown):
             return self.moves
         raise ProblemError("the free schedule has no open grips; it has states")
 
-    @classmethod
-    def asked(
-        cls, engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, **words: Any
+    def but(  # noqa: PLR0913  # what `seqopt.pose` takes
+        self,
+        *,
+        engine: Engine | EllipsisType = ...,
+        moves: Schedule | FreeRules | EllipsisType = ...,
+        criterion: Criterion | EllipsisType = ...,
+        goals: Sequence[Amount | str] | str | EllipsisType = ...,
+        limits: Sequence[Limit | Filter | Resource | str] | str | EllipsisType = ...,
+        budgets: Sequence[Budget | str] | str | EllipsisType = ...,
+        stands: Standing | Mortar | str | EllipsisType | None = ...,
+        scenarios: Scenarios | Sequence[Scene] | EllipsisType = ...,
+        over: RobustAim | str | EllipsisType = ...,
+        orders: Orders | str | EllipsisType | None = ...,
+        resources: Resources | EllipsisType = ...,
     ) -> Problem:
-        """Return the problem of keywords, values or words, as `seqopt.pose` takes them."""
-        return cls(engine, moves, criterion, **_in_values(words, engine))
+        """Return the problem with other values or words, as of `seqopt.pose`; ... keeps one.
 
-    def but(self, **words: Any) -> Problem:
-        """Return the problem with other values of keywords, values or words."""
-        return replace(self, **_in_values(words, self.engine))
+        Filters and resources of a path stand among ``limits``.
+        """
+        given = {name: value for name, value in locals().items() if value is not ...}
+        del given["self"]
+        parts = [given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion")]
+        require_parts(*parts)
+        return replace(self, **_in_values(given, parts[0].network.scene))
 
     @property
     def says_range(self) -> bool:
@@ -359,15 +378,12 @@ class Problem(Shown):
         return {}
 
 
-def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
+def _in_values(words: dict[str, Any], scene: Scene) -> dict[str, Any]:
     """Return keywords with all words parsed into values."""
-    network = getattr(engine, "network", None)
-    if "limits" in words and isinstance(network, Network):  # else it is refused later
-        found = parse_limits(words["limits"], network.scene)
-        filters = tuple(each for each in found if isinstance(each, Filter))
-        paths = tuple(each for each in found if isinstance(each, Resource))
-        rest = [each for each in found if each not in (*filters, *paths)]
-        words = {**words, "limits": rest, "filters": filters, "paths": paths}
+    if "limits" in words:
+        found = parse_limits(words["limits"], scene)
+        for name, kind in (("limits", Limit), ("filters", Filter), ("paths", Resource)):
+            words[name] = tuple(each for each in found if isinstance(each, kind))
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
@@ -381,12 +397,19 @@ def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount,
     return tuple(goal for goals in each for goal in goals)
 
 
+def _scenes(given: object) -> tuple[Scene, ...]:
+    some = getattr(given, "scenes", given)
+    some = tuple(some) if isinstance(some, Sequence) else (None,)
+    if not all(isinstance(each, Scene) for each in some):
+        raise ProblemError(f"scenarios {short(given)}: give seqopt.scenarios(scene), or scenes")
+    return some
+
+
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
-    "limits": as_limits,
     "budgets": parse_budgets,
     "stands": Standing.of,
-    "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
+    "scenarios": _scenes,
     "over": parse_robust,
     "orders": lambda given: None if given is None else Orders.of(given),
 }

@@ -467,7 +467,7 @@ class Filter:
     loosened: Loosened | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        require_named(self)
+        require_named(self, "passes", "refuses", "twin", "loosened")
 
     def __str__(self) -> str:
         return self.name

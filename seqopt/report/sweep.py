@@ -63,7 +63,7 @@ def sweep(
     problems: str | Sequence[Scene | Path | str] | Mapping[str, Mapping[str, str]],
     plan: Callable[[Any], Plan] = optimize,
     *,
-    mortars: Sequence[str] = (),
+    mortars: Sequence[str] | str = (),
     out: Path | str | None = None,
     workers: int = 1,
     executor: Executor | None = None,
@@ -79,7 +79,7 @@ def sweep(
     plan : callable, optional
         Takes a scene, or what tells a problem apart, returns its plan: `seqopt.optimize`, of which
         ``functools.partial`` fixes other arguments. Other processes need a function of a module.
-    mortars : sequence of str, optional
+    mortars : sequence of str or str, optional
         With which it is proven how many steps fall: ``"dry"``, ``"epoxy"``.
     out : pathlib.Path or str, optional
         A CSV file that grows row by row; rows that it has are kept, and not computed again.
@@ -126,7 +126,7 @@ def sweep(
         if progress is not None:
             progress(Stage("problems", sum(name in rows for name in names) / len(names)))
 
-    solve = partial(_row, plan, tuple(mortars))
+    solve = partial(_row, plan, (mortars,) if isinstance(mortars, str) else tuple(mortars))
     with worker_pool(executor, workers) as pool:
         begun = todo if pool is None else todo[::-1]  # ranges go up: the largest is not left alone
         with closing(map_ordered(solve, begun, pool, done)) as found:

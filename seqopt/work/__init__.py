@@ -190,6 +190,8 @@ def worker_pool(executor: Executor | None = None, workers: int = 1) -> Iterator[
     WorkerPool or None
         None where there is but this process.
     """
+    if workers < 1:
+        raise WorkerError(f"workers is {workers}; give a whole number from 1")
     kept = _KEPT.get()
     if kept is not None or (executor is None and workers == 1):
         yield kept
@@ -535,7 +537,7 @@ class Clock:
             with _ending(self._end + GRACE - time.perf_counter()):
                 yield
         except TimeoutError:
-            raise TimeUpError(f"{what} takes longer; give more") from None
+            raise TimeUpError(f"{what} takes longer; give more time") from None
 
     def tried(self, work: Callable[[], _Result]) -> tuple[_Result | None, str]:
         """Return what some work finds, or None and why it ended early: `TIME` or `INTERRUPT`."""

@@ -69,11 +69,11 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     found = solve(asked, "cascade", proof=False)
     problem = pose(engine25, schedule, CRITERIA[criterion])
     for name, options in (("rank_search", {"horizon": 1}), ("cascade", {})):
-        plan = solve(problem, name, **options)
+        plan = solve(problem, name, options=options)
         assert found.nodes == plan.nodes
         assert found.steps == plan.steps
     for name, options in (("rank_search", {}), ("rank_search", {"horizon": 1})):
-        assert solve(problem, name, proof=False, **options).nodes == found.nodes
+        assert solve(problem, name, proof=False, options=options).nodes == found.nodes
     fewest = windows(schedule, found.nodes)
     if isinstance(CRITERIA[criterion], RankSum):
         assert fewest == found.models

@@ -57,7 +57,7 @@ def by_aims(problem, aim):
         yield name, seqopt.solve(problem, name).certificate.objective
     if aim is Aim.SUM:
         size = max(len(move.candidates) for move in problem.schedule.moves)
-        yield "beam", seqopt.solve(problem, "beam", width=size).certificate.objective
+        yield "beam", seqopt.solve(problem, "beam", options={"width": size}).certificate.objective
         yield "instance", seqopt.solve(compile_instance(problem)).certificate.objective
     else:
         told = compile_instance(problem, aim=Aim.PEAK)

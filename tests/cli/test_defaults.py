@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import math
 
 import pandas as pd
 import pytest
@@ -218,7 +219,8 @@ def test_a_pareto_set_takes_a_criterion_as_others_do(capsys):
 
 
 def test_help_says_the_friction_that_is_taken():
-    (said,) = {f"{mortar.friction:.3g}" for mortar in (DRY, EPOXY, find_mortar("bond=1e4"))}
+    (friction,) = {mortar.friction for mortar in (DRY, EPOXY, find_mortar("bond=1e4"))}
+    said = f"{friction:.3g}, of {math.degrees(math.atan(friction)):.3g}°"
     texts = signature_of(seqopt.assess).texts()
-    assert f"default: {said}, of 25°, with every mortar" in texts["friction"][1]
+    assert f"default: {said}, with every mortar" in texts["friction"][1]
     assert "°" not in texts["mortar"][1]

@@ -59,7 +59,8 @@ def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
     status, said, _ = run(capsys, "pareto", arch, *words, "--out", str(out))
     assert status == 0
     table = pd.read_csv(out / "pareto.csv")
-    assert f"{len(table)} points, complete; written to {out}; " in said
+    many = "s" * (len(table) != 1)
+    assert f"{len(table)} point{many}, complete; written to {out}; " in said
     plans = pd.read_csv(out / "plans.csv")
     assert {*plans["point"]} == {*table["point"]}
     for point, rows in plans.groupby("point"):

@@ -41,7 +41,7 @@ BAD = {
     # schedules, formulations, criteria, limits
     "optimize ARCH --formulation overlap_dp --schedule ring": "schedule 'ring' does not exist",
     "optimize ARCH --formulation beam --option depth=3": "--option depth=3: beam has width",
-    "optimize ARCH --formulation beam --option width=wide": "width is 'wide'; give an int",
+    "optimize ARCH --formulation beam --option width=wide": "width is 'wide'; give a whole number",
     "optimize ARCH --criterion T_max=heavy": "'heavy' is not a positive",
     "optimize ARCH --limit T_max": "--limit T_max",
     "optimize ARCH --limit payload=9": "values with --payload",

@@ -108,7 +108,7 @@ def test_schedules_are_found_by_name_file_and_value(engine25, loop25, tmp_path):
 def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
     network = engine25.network
     with pytest.raises(
-        StepError, match=r"schedule 'ring' does not exist; .* three-robot, .*loop, or a CSV file"
+        StepError, match=r"schedule 'ring' does not exist; .* three-robot, .*loop.*, or a CSV file"
     ):
         find_schedule(network, "ring")
     with pytest.raises(FileError, match=r"cannot read .*none.csv"):

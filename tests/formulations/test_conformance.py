@@ -281,7 +281,7 @@ def test_budgets_against_brute_force(name, examples):
 
 
 def valued(problem, name, **options):
-    return seqopt.solve(problem, name, **options).certificate.objective
+    return seqopt.solve(problem, name, options=options).certificate.objective
 
 
 @pytest.fixture(scope="module")
@@ -337,6 +337,15 @@ def test_an_assignment_needs_a_state_of_every_level():
         graph = Graph(source, target, np.ones((3, 1)), (peak,), ends)
         with pytest.raises(ProblemError, match="an assignment chooses a state of every level"):
             PROGRAMS[name].solve.choose(graph, Watch())
+
+
+@pytest.mark.parametrize("found", [None, (1, 2)])
+def test_what_is_no_choice_is_named(problem8, found):
+    own = on_graph("own", "says nothing", lambda graph, watch: found, aim=Aim.SUM)
+    kind = type(found).__name__
+    for asked in (problem8, seqopt.compile_instance(problem8)):
+        with pytest.raises(SolverError, match=f"formulation own returned a {kind}, not a Choice"):
+            seqopt.solve(asked, own)
 
 
 def test_how_much_is_enumerated_at_once(monkeypatch):

@@ -124,9 +124,9 @@ def test_limits_that_leave_no_plan_are_said(name):
 def test_what_does_not_fit_gets_one_line(name):
     for option, value in {"speed": 2, **dict.fromkeys(ALL[name].options, 0)}.items():
         said = "option|(width|charge|most|horizon) is 0|max_memory|no plan was found yet; give more"
-        said = "speed: " if option == "speed" else said
+        said = "option speed=2: " if option == "speed" else said
         with pytest.raises((ProblemError, TimeUpError), match=said) as caught:
-            seqopt.solve(posed("minmax"), name, **{option: value})
+            seqopt.solve(posed("minmax"), name, options={option: value})
         assert "\n" not in str(caught.value)
     with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
         seqopt.solve(posed("minmax,bond"), name)

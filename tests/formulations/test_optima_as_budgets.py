@@ -241,7 +241,7 @@ def test_all_states_of_the_arch_are_counted(arch):
 def test_where_memory_ends_there_is_a_bound(arch):
     best = seqopt.solve(arch, "schedule_search").selection.objective[0]
     fresh = replace(arch, answers={})  # which have no responses yet
-    short = seqopt.solve(fresh, "schedule_search", max_memory=1e6)
+    short = seqopt.solve(fresh, "schedule_search", options={"max_memory": 1e6})
     assert (short.status, short.selection.stopped) == ("feasible", "memory")
     assert best / 2 < short.selection.bound[0] <= best <= short.selection.objective[0]
     for words, error, said in (
@@ -252,7 +252,7 @@ def test_where_memory_ends_there_is_a_bound(arch):
             small = seqopt.make_engine("compliance", small_arch(4))
             problem = replace(arch, goals=build_states(small, FreeRules(), ONES, aim).goals)
             with pytest.raises(error, match=said):
-                seqopt.solve(problem, "schedule_search", **words)
+                seqopt.solve(problem, "schedule_search", options=words)
 
 
 @pytest.mark.parametrize(

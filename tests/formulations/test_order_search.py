@@ -261,14 +261,14 @@ def test_the_proof_of_orders_knows_what_must_stand():
 def test_beyond_the_most_sets_the_own_order_has_a_bound():
     problem = posed(small_arch(4), aim="F_largest")
     best = seqopt.solve(problem, FORMULATION).selection.objective[0]
-    plan = seqopt.solve(problem, FORMULATION, most=4)
+    plan = seqopt.solve(problem, FORMULATION, options={"most": 4})
     own = solve(replace(problem, orders=None), "schedule_search").selection.objective[0]
     assert (plan.selection.stopped, plan.status) == ("size", "feasible")
     assert plan.selection.objective[0] == own > best * 1.001
     assert plan.selection.bound[0] <= best * (1 + 1e-9)
     assert plan.summary()["status"] == plan.status
     with pytest.raises(ProblemError, match="option most=-1"):
-        seqopt.solve(problem, FORMULATION, most=-1)
+        seqopt.solve(problem, FORMULATION, options={"most": -1})
 
 
 def test_time_leaves_an_order_and_a_bound():
@@ -283,7 +283,7 @@ def test_time_leaves_an_order_and_a_bound():
     assert found.status == "feasible"
     assert found.selection.bound[0] <= found.selection.objective[0]
     with pytest.raises(TimeUpError, match="no plan was found yet; give more"):
-        seqopt.solve(problem, FORMULATION, seconds=0.0)
+        seqopt.solve(problem, FORMULATION, options={"seconds": 0.0})
 
 
 @once

@@ -294,5 +294,7 @@ def test_commands_write_and_judge(tmp_path, capsys):
     mine.write_text("arcs 5 5", "utf-8")
     assert main(["judge", str(out), str(mine)]) == 1
     assert "the path is at node 0" in capsys.readouterr().err
+    assert main(["instance", "chain:bricks=7", "--out", str(tmp_path / "x.mps")]) == 0
+    assert "seqopt judge its .npz SOLUTION" in capsys.readouterr().out
     assert main(["instance", "arch25", "--out", str(tmp_path / "x.txt")]) == 2
     assert main(["judge", str(mine), str(mine)]) == 2

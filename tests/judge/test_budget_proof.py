@@ -183,7 +183,7 @@ def test_few_labels_stop_with_a_bound(problem25):
     best = solve(capped, "labels")
     assert best.ended is End.DONE
     assert best.certificate.claimed_gap <= 1e-6
-    few = solve(capped, "labels", most=8)
+    few = solve(capped, "labels", options={"most": 8})
     assert few.selection.bound[0] <= best.certificate.objective <= few.certificate.objective
     assert few.ended is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
@@ -191,7 +191,7 @@ def test_few_labels_stop_with_a_bound(problem25):
         solve(problem25.but(budgets="steps_over:F_rob9=100:1"), "labels")
     tight = problem25.but(budgets=["travel=11.4m", "steps_over:F_largest=250:18"])
     with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
-        solve(seqopt.compile_instance(tight), "labels", most=1, time_limit=0)
+        solve(seqopt.compile_instance(tight), "labels", options=["most=1"], time_limit=0)
 
 
 def test_labels_prove_only_what_all_of_them_close(monkeypatch):

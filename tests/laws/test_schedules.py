@@ -1,5 +1,6 @@
 """Laws of methods and schedules, of the ground ends, and of verdicts."""
 
+import re
 from contextlib import suppress
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from seqopt.errors import MechanismError, SceneError, StepError
 from seqopt.exchange.schedules import parse_schedule, schedule_text
 from seqopt.network.network import GROUND, build_network
 from seqopt.responses.quantities import CHOSEN_BY, lengths, responses_of
-from seqopt.sequence.methods import METHODS, SCHEDULES
+from seqopt.sequence.methods import _NUMBERS, METHODS, SCHEDULES
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.steps import StepKind, check_sequence
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
@@ -97,19 +98,25 @@ def test_with_any_robots_steps_are_possible_and_all_is_held(name, scene, data):
     assert not steps or broken(network, name, steps) == []
 
 
+ALL = METHODS | SCHEDULES
+LEAST = dict.fromkeys([*METHODS, "two-robot", "loop"], 2)  # robots
+LEAST |= dict.fromkeys(["three-robot", "modified-sequential"], 3)
+
+
 @pytest.mark.parametrize("count", [2, 3, 5])
 @pytest.mark.parametrize(
     "scene", [running_bond(3, 3), from_both_ends(9), branch()], ids=lambda s: s.name
 )
 @pytest.mark.parametrize("name", [*METHODS, *SCHEDULES])
 def test_robots_that_reach_everything_build_everything(name, scene, count):
-    network = build_network(replace(scene, robots=anywhere(count)))
-    least = 3 if name in {"three-robot", "modified-sequential"} else 2
-    if count < least:
-        with pytest.raises(StepError, match="needs three"):
-            (METHODS | SCHEDULES)[name](network)
+    network, make = build_network(replace(scene, robots=anywhere(count))), ALL[name]
+    try:
+        make(network)
+    except StepError as error:
+        needs = _NUMBERS.index(re.search(r"needs (\w+)", str(error))[1])
+        assert count < needs == LEAST.get(name, needs)
         return
-    steps = possible((METHODS | SCHEDULES)[name], network, lambda free: free[0])
+    steps = possible(make, network, lambda free: free[0])
     assert steps
     assert broken(network, name, steps) == []
 

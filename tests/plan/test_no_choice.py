@@ -207,7 +207,7 @@ def test_ranks_of_a_shared_step_depend_on_the_choice_before_it(engine25, loop25)
     [("overlap_dp", {}), ("cascade", {"charge": "earlier"}), ("rank_search", {"horizon": 2})],
 )
 def test_what_looks_further_leaves_the_proof_out(problem, name, options):
-    plan, proven = (solve(problem, name, proof=proof, **options) for proof in (False, True))
+    plan, proven = (solve(problem, name, proof=proof, options=options) for proof in (False, True))
     assert plan.certificate is None
     assert plan.status == "unproven"
     assert plan.steps == proven.steps

@@ -230,7 +230,7 @@ free = partial(seqopt.optimize, schedule="free", aim="F_largest,steps")
 
 
 def test_every_row_is_what_one_problem_has(tmp_path):
-    found = sweep(WORDS, free, mortars=["dry"], out=tmp_path / "rows.csv")
+    found = sweep(WORDS, free, mortars="dry", out=tmp_path / "rows.csv")
     assert [*found["problem"]] == WORDS
     for row in found.to_dict("records"):
         plan = free(row["problem"])

@@ -159,6 +159,7 @@ WRONG = {
     "its function failed: ZeroDivisionError": lambda states: 1 / 0,
     r"returned shape \(\); give": lambda states: 1.0,
     "a value is -1; give numbers from zero": lambda states: -1.0 * (states.nodes[:, 0] > -2),
+    "its function failed: ValueError: could not convert string": lambda s: ["a"] * len(s.nodes),
     "a value is nan": lambda states: np.full(len(states.nodes), np.nan),
 }
 
@@ -167,7 +168,7 @@ WRONG = {
 def test_a_function_that_is_wrong_is_one_line(said):
     with pytest.raises(ProblemError, match=f"amount own: .*{said}"):
         seqopt.solve(posed((Amount("own", WRONG[said]),)))
-    if "value" not in said:
+    if "value" not in said and "string" not in said:
         with pytest.raises(ProblemError, match=f"filter own: .*{said}"):
             seqopt.solve(posed("minmax", [Filter("own", WRONG[said])]))
 
@@ -177,6 +178,16 @@ def test_responses_that_no_state_has_are_named():
         kind = type(part).__name__.lower()
         with pytest.raises(ProblemError, match=f"{kind} own: a state .* has no F_move; give C_max"):
             seqopt.solve(posed((part,)) if kind == "amount" else posed("minmax", [part]))
+
+
+def test_parts_that_are_none_are_refused():
+    with pytest.raises(ProblemError, match="amount own: twin is 3; give a function"):
+        Amount("own", busy, twin=3)
+    with pytest.raises(ProblemError, match="filter own: refuses is 3; give a function"):
+        Filter("own", busy, refuses=3)
+    for kind in (Amount, Filter):
+        with pytest.raises(ProblemError, match=r"responses are 'T_max'; give names, as"):
+            kind("own", busy, responses="T_max")
 
 
 def test_what_is_neither_is_refused():
@@ -199,7 +210,7 @@ BUDGETS = {
 NO_BUDGETS = {
     "bricks=40": "does not exist; give travel=3.5m, .* travel=0.8",
     "travle=3m": "did you mean travel",
-    "travel=3s": "give travel=NUMBERm",
+    "travel=3s": "give it as travel=3m",
     "steps_over:T_max=80:3m": "name what is counted, a level and a number of steps",
     "regrips=few": "'few' is not a number from 0",
     5: "as words",

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from seqopt.errors import SeqoptError
+from seqopt.responses.quantities import RESPONSES
 from tests.builders import ROOT
 from tests.quality import fuzz
 from tests.quality.fuzz import judge, main, run
@@ -81,8 +82,10 @@ def test_an_end_that_is_wrong_is_seen(mutator, monkeypatch, does, seen):
 def test_a_result_that_is_not_finite_is_seen(mutator, monkeypatch, lost):
     case = case_of(mutator, "analyze", "scene.json", "--method", "sequential")
     assert judge(case)[1] == ""
-    text = "step,type,bricks,rob1_brick,rob1_node,F_rob1_N,F_sup_N,M_sup_Nm,F_min_N,F_max_N,F_avg_N"
-    text += ",T_pct,D_max_1e-3mm,D_avg_1e-3mm,D_std_1e-3mm\n1,place,1,1,1,{},1,1,1,{},1,1,1,1,1\n"
+    columns = [each.column for each in RESPONSES.values()]
+    values = ["{}" if name == "F_max_N" else "1" for name in columns]
+    text = ",".join(["step,type,bricks,rob1_brick,rob1_node,F_rob1_N", *columns])
+    text += ",".join(["\n1,place,1,1,1,{}", *values]) + "\n"
     cells = ("", 1) if lost == "F_rob1_N" else (1, "inf")
     monkeypatch.setattr(fuzz, "run_command", lambda _: print(text.format(*cells), end="") or 0)
     said = "a robot that grips has no force" if lost == "F_rob1_N" else "response is not finite"

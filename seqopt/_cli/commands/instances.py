@@ -64,7 +64,8 @@ def write(
     save_instance(found, to)
     limited = ", ".join(f"{c.name} {c.most:g}" for c in found.caps if c.column is not None)
     lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
-    lines += [f"written to {to}; seqopt judge {to} SOLUTION checks an answer"]
+    judged = "its .npz" if to.suffix == ".mps" else to
+    lines += [f"written to {to}; seqopt judge {judged} SOLUTION checks an answer"]
     notes = () if out else (f"file: {to}; --out names another, or a folder for every format",)
     return Answer(found.facts_of(), "\n".join(lines), written=(to,), notes=notes)
 

@@ -89,7 +89,8 @@ def run(
     )
     early = front.stopped == INTERRUPT
     points = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    text = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
+    count, whole = len(front.steps), "complete" if front.complete else "not complete"
+    text = f"{count} point{'s' * (count != 1)}, {whole}"
     answer = Answer(
         {**front_counts(front), "points": shown_table(front.table)},
         f"{points}{text}; {output.said()}",
