@@ -75,6 +75,7 @@ OFFERS = {
     "as_measured": "seqopt.exchange.imports",
     "check_postures": "seqopt.arms._judge",
     "compute_held_postures": "seqopt.arms._permits",
+    "find_curing": "seqopt.times._curing_law",
     "find_doubts": "seqopt.exchange._doubts",
     "find_overlaps": "seqopt.exchange._doubts",
     "find_path": "seqopt.instances._solve",

@@ -116,13 +116,15 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
     return tuple(f"robot {name}: its arm has {text}" for name, text in found if text)
 
 
-def unread_models(scene: Scene) -> Iterator[str]:
-    """Yield whose arm has a model that is not there or cannot be read, and why."""
+def unread_models(scene: Scene) -> tuple[str, ...]:
+    """Return whose arm has a model that is not there or cannot be read, and why."""
+    out = []
     for robot in scene.robots:
         try:
             _ = None if robot.arm is None else read_urdf(model_path(robot.arm))
         except (SceneError, FileError) as error:
-            yield f"robot {robot.name}: {str(error).removeprefix('arm: ')}"
+            out.append(f"robot {robot.name}: {str(error).removeprefix('arm: ')}")
+    return tuple(out)
 
 
 def _followed(robot: _Link) -> list[str]:

@@ -75,7 +75,9 @@ def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
     watch = Watch(min(run.left, options.get("seconds", inf)), run.progress)
     seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
-        selection = _choose_path(instance, formulation, run, watch)
+        limit = {"seconds": run.left} if run.left < inf else {}
+        options |= {"watch": watch} if formulation.watched else limit
+        selection = _choose_path(instance, formulation, options, watch)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with timed(seconds, "verify"):
@@ -84,26 +86,23 @@ def find_path(instance: Instance, formulation: Formulation, run: Run) -> Found:
     return Found(selection, certificate, (), seconds)
 
 
-def _choose_path(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> Solution:
+def _choose_path(
+    instance: Instance, formulation: Formulation, options: dict[str, Any], watch: Watch
+) -> Solution:
     """Return the formulation's solution, converted to numbers; raise why there is none."""
     name = formulation.name
-    limit: dict[str, Any] = {} if run.left == inf else {"seconds": run.left}
-    limit = {"watch": watch} if formulation.watched else limit
-    limit |= formulation.parse_options(run.options)
-    solve = partial(formulation.solve, deepcopy(instance), **limit)
+    solve = partial(formulation.solve, deepcopy(instance), **options)
     try:
         with _answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, Solution, solve)
     except InfeasibleError as error:
         if not instance.caps:
-            raise SolverError(
-                f"formulation {name} says that no path is allowed, and some are: {error}"
-            ) from None
+            text = f"formulation {name} says that no path is allowed, and some are: {error}"
+            raise SolverError(text) from None
         raise refusal(instance, name, exact=formulation.looks_at_all) from None
     except (NothingFoundError, TimeUpError) as error:
-        low = watch.bound
-        text = f"{error} (no path is below {low:.6g})" if isfinite(low) else str(error)
-        raise (KeyboardInterrupt if watch.interrupted else type(error))(text) from error
+        low = f" (no path is below {watch.bound:.6g})" * isfinite(watch.bound)
+        raise (KeyboardInterrupt if watch.interrupted else type(error))(f"{error}{low}") from error
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error

@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._registry import Later
+from seqopt._registry import Later, required
 from seqopt.arrays import Bools, Floats, Ints, KnownRows
 from seqopt.contact.mortar import (
     DRY,
-    Curing,
     Mortar,
-    _find_curing,
     _mortar_name,
     _with_friction,
     _with_mortar,
@@ -46,8 +44,9 @@ class Standing:
     """The demand that every state of a schedule is proven to stand, robots within payload.
 
     ``mortar``: of all joints; or its name; ``tilt``: that every state must survive in every
-    direction, rad; ``curing``: which share of its bond mortar has at an age, or its words, by
-    default all at once. Where nobody asks for time, all wait until it has cured.
+    direction, rad; ``curing``: which share of its bond mortar has at an age, a
+    `seqopt.times.Curing` or its words, by default all at once. Where nobody asks for time, all wait
+    until it has cured.
 
     >>> Standing("dry").described()["tilt_deg"]
     0.0
@@ -55,12 +54,12 @@ class Standing:
 
     mortar: Mortar = field(default=DRY)
     tilt: float = 0.0
-    curing: Curing | None = None
+    curing: Any = None
 
     def __post_init__(self) -> None:
         settle(self, mortar=find_mortar(self.mortar))
         if self.curing is not None:  # mortar that never cures, or at once, is another mortar
-            curing, mortar = _find_curing(self.curing), self.mortar
+            curing, mortar = required("find_curing")(self.curing), self.mortar
             mortar = mortar if curing.points else Mortar(friction=mortar.friction)
             bonded = mortar.tensile_strength or mortar.cohesion
             bonded = bonded and curing.points[:1] != ((0.0, 1.0),)  # not all of it from the first
@@ -298,5 +297,4 @@ def find_standing(
     mortar = mortar if friction is None else _with_friction(mortar, friction)
     if tilt is not None and not tilt < 90:
         raise ProblemError(f"--tilt {tilt:g}: give an angle from 0 to below 90 degrees")
-    cures = _find_curing(" ".join(curing)) if curing else None
-    return Standing(mortar, radians(tilt or 0.0), cures)
+    return Standing(mortar, radians(tilt or 0.0), " ".join(curing) if curing else None)

@@ -19,7 +19,10 @@ from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.times._build import times
+    from seqopt.times._curing_law import Curing
     from seqopt.times._durations import Durations
 
-__all__ = ["Durations", "times"]
-__getattr__, __dir__ = later(__name__, {"Durations": "_durations", "times": "_build"})
+__all__ = ["Curing", "Durations", "times"]
+__getattr__, __dir__ = later(
+    __name__, {"Curing": "_curing_law", "Durations": "_durations", "times": "_build"}
+)

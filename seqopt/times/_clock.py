@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.mortar import Curing
 from seqopt.errors import SolverError
 from seqopt.graph.graph import TIME, Graph, _Target, _to_go
 from seqopt.judge._proof import Rebuilt
@@ -19,6 +18,7 @@ from seqopt.judge.certificate import limit_below
 from seqopt.network.network import Network
 from seqopt.stability.standing import Standing
 from seqopt.times._curing import CuringStates, FallCuts, JointsInTime
+from seqopt.times._curing_law import Curing
 from seqopt.times._graph import HELD, NOW, TimedGraph
 from seqopt.times._steps import require_durations
 

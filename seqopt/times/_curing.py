@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import PartialAssemblies, _contact_at
-from seqopt.contact.mortar import Curing, Mortar
+from seqopt.contact.mortar import Mortar
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
@@ -23,6 +23,7 @@ from seqopt.stability.assessment import _verdict_of, bonded
 from seqopt.stability.limit_analysis import EXACT, LARGEST_FORCE, contact_work, limits
 from seqopt.stability.standing import Standing
 from seqopt.stability.verdict import Verdict
+from seqopt.times._curing_law import Curing
 
 SLACK = 1e-9  # of a time: ages this much short of a point count as there
 

@@ -9,13 +9,14 @@ import numpy as np
 
 import seqopt
 from seqopt.contact.assembly import step_assembly
-from seqopt.contact.mortar import EPOXY, _find_curing
+from seqopt.contact.mortar import EPOXY
 from seqopt.judge._schedules import judge_schedule
 from seqopt.scene.scene import with_robots
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import verdict
 from seqopt.stability.verdict import Verdict
+from seqopt.times._curing_law import find_curing
 from tests.brute_force import ONES, allowed, distance
 from tests.builders import small_arch
 from tests.plain_rules import PlainBook
@@ -149,7 +150,7 @@ def least_cured_makespan(engine, rules, words, most=np.inf):
     """
     book, tick = PlainBook(engine.network, rules), count()
     worst, stands = worsts(engine, rules), stands_with(engine.network)
-    curing, none = _find_curing(words), (None,) * len(engine.network.scene.robots)
+    curing, none = find_curing(words), (None,) * len(engine.network.scene.robots)
     (first, grips, _), _ = begun(engine.network.scene, rules)
     ages = () if rules.begin is None else rules.begin.ages
     placed = (*(-age for age in ages), *[0.0] * (first - len(ages)))

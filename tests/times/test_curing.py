@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.mortar import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.plan.plan import Status
 from seqopt.sequence.rules import FreeRules
 from seqopt.stability.standing import Standing
-from seqopt.times import Durations
+from seqopt.times import Curing, Durations
 from seqopt.times._curing import CuringBuilds, JointsInTime
+from seqopt.times._curing_law import find_curing
 from seqopt.times._step_check import check_cured, step_ends
 from seqopt.times._steps import step_times
 from seqopt.times._tables import busy_table, reassign
@@ -164,13 +164,13 @@ def test_bonds_only_grow(shares, last, times):
     found = [joints.at(5, np.array([now]), placed)[0] for now in np.linspace(0, 3e5, 20)]
     assert (np.diff(found, axis=0) >= 0).all()
     assert (found[-1] == 1.0).all()
-    again = _find_curing(str(curing))
+    again = find_curing(str(curing))
     assert np.allclose(again.points, curing.points, rtol=1e-5)
 
 
 def test_with_full_bond_verdicts_are_those_without_age():
     network = engine_of(5, 2).network
-    builds = CuringBuilds(network, seqopt.EPOXY, _find_curing("15min"))
+    builds = CuringBuilds(network, seqopt.EPOXY, find_curing("15min"))
     steps = [step for step in seqopt.sequential(network) if step.bricks > 1]
     for mortar, share in ((seqopt.EPOXY, 1.0), (seqopt.DRY, 0.0)):
         wanted = [r.verdict for r in seqopt.assess(network, steps, mortar)]
@@ -192,10 +192,10 @@ def test_with_full_bond_verdicts_are_those_without_age():
 )
 def test_words_of_curing(words, said):
     if said is None:
-        assert _find_curing(words).points[-1] == (15.0, 1.0)
+        assert find_curing(words).points[-1] == (15.0, 1.0)
         return
     with pytest.raises(SceneError, match=said):
-        JointsInTime(engine_of(4, 2).network, _find_curing(words))
+        JointsInTime(engine_of(4, 2).network, find_curing(words))
 
 
 def test_what_is_not_modeled_says_so():

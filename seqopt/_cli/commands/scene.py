@@ -54,5 +54,4 @@ def run(
         save_scene(found, export)
         lines.append(f"written to {export}")
     written = () if export is None else (export,)
-    notes = (*unread_models(found),)
-    return Answer(facts={"scene": facts}, text="\n".join(lines), written=written, notes=notes)
+    return Answer({"scene": facts}, "\n".join(lines), written=written, notes=unread_models(found))
