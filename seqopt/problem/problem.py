@@ -399,10 +399,12 @@ def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount,
 
 def _scenes(given: object) -> tuple[Scene, ...]:
     some = getattr(given, "scenes", given)
-    some = tuple(some) if isinstance(some, Sequence) else (None,)
-    if not all(isinstance(each, Scene) for each in some):
+    if isinstance(some, str) or not isinstance(some, Sequence):
         raise ProblemError(f"scenarios {short(given)}: give seqopt.scenarios(scene), or scenes")
-    return some
+    for number, each in enumerate(some, start=1):
+        if not isinstance(each, Scene):
+            raise ProblemError(f"scenario {number}: {short(each)} is not a scene; give scenes")
+    return tuple(some)
 
 
 READ: dict[str, Callable[[Any], Any]] = {
