@@ -31,6 +31,7 @@ _TINY_BRICK = 0.002  # m; the largest dimension of a brick whose lengths were me
 _FAR_REACH = 100.0  # m; of a robot, and of the base of its arm
 _LONG_TOOL, _LONG = 10.0, 500.0  # m; of an arm, and of the whole structure
 _GALE = 5.0  # wind over weight
+_BELOW = 0.25  # of the smallest dimension; by less a wedge may hang below what bears its sides
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
@@ -39,7 +40,8 @@ def _find_odd_units(scene: Scene) -> Iterator[str]:
     at, down = np.array([brick.position for brick in scene.bricks]), np.array(scene.gravity)
     if (pull := math.hypot(*down)) > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
-    if max(np.dot(end.position, down) for end in scene.grounds) < (at @ down).min():
+    room = _BELOW * pull * min(min(brick.dimensions) for brick in scene.bricks)
+    if max(np.dot(end.position, down) for end in scene.grounds) < (at @ down).min() - room:
         yield "gravity points away from every ground end; check its sign"
     if (length := np.ptp(at, axis=0).max()) > _LONG:
         yield f"it is {length:.4g} m long, which looks like millimeters; give meters"
