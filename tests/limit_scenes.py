@@ -7,7 +7,6 @@ import numpy as np
 import seqopt
 from tests.builders import on_soft_ground, with_part
 
-Grips = tuple[int, ...]
 LOOSE_AT = 11  # the joint that is loosened: between bricks 12 and 13 of 25
 HELD = (40, 45, 49)  # three grips off one line, all beyond that joint
 
@@ -24,15 +23,6 @@ def loosened(scene: seqopt.Scene, factor: float, *, only_turning: bool) -> seqop
     joint = scene.joints[LOOSE_AT]
     change = {kind: tuple(factor * k for k in getattr(joint, kind)) for kind in kinds}
     return with_part(scene, "joints", LOOSE_AT, **change)
-
-
-def far_grips(count: int) -> tuple[Grips, ...]:
-    """Return no grip, one at the tip, two apart, three close together at the tip."""
-    last = 2 * count - 1
-    sets: list[Grips] = [(), (last,)]
-    if count >= 5:
-        sets += [(count | 1, last), (last - 3, last - 2, last), (count // 2 * 2, count + 2, last)]
-    return tuple(dict.fromkeys(sets))
 
 
 def without_joint(scene: seqopt.Scene) -> seqopt.Network:

@@ -15,8 +15,6 @@ from seqopt.stability._steps import judged
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import violation
 
-TIGHT = 1e-8  # violation, over the force scale, up to which forces prove
-
 
 @pytest.fixture
 def held():
@@ -57,6 +55,6 @@ def test_forces_prove_within_their_tolerance_alone(held, share, proves):
     push = np.zeros(least.contact_force.shape)
     push[0, 0] = 1.0
     wrong = violation(held, case, replace(least, contact_force=least.contact_force + push))
-    given = least.contact_force + share * TIGHT / wrong * push
+    given = least.contact_force + share * 1e-8 / wrong * push  # that far off they prove
     answer = replace(least, contact_force=given, motion=np.zeros(least.motion.shape))
     assert (judged(held, case, answer) is not None) is proves
