@@ -23,9 +23,10 @@ from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Joint
 from seqopt.scene.scene import Scene
-from tests.limit_scenes import HELD, LOOSE_AT, Grips, chain, far_grips, loosened, without_joint
+from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import Reference, solve_exactly
 
+Grips = tuple[int, ...]
 BRICKS = 25
 SETS = 4  # random ones, where one joint is loose
 LARGEST_FRAME = 100  # bricks; beyond, the frame is not asked
@@ -35,6 +36,15 @@ COMPARED = "compliance, to compare"  # six digits, to choose by
 ENGINES = ("compliance", COMPARED, "frame")
 UNDECIDED = 1e-3  # share of an answer from which on last digits decide whether it is a mechanism
 FIELDS = Want.DISPLACEMENTS | Want.JOINTS | Want.BRICKS
+
+
+def far_grips(count: int) -> tuple[Grips, ...]:
+    """Return no grip, one at the tip, two apart, three close together at the tip."""
+    last = 2 * count - 1
+    sets: list[Grips] = [(), (last,)]
+    if count >= 5:
+        sets += [(count | 1, last), (last - 3, last - 2, last), (count // 2 * 2, count + 2, last)]
+    return tuple(dict.fromkeys(sets))
 
 
 class Exact(NamedTuple):
