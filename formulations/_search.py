@@ -392,8 +392,11 @@ def search_states(problem: States, options: Options, tell: Watching) -> Solution
             search.incumbent = min(filter(None, plans), key=lambda p: p.objective, default=None)
             if search.is_best and search.incumbent:
                 return search.incumbent
-        if search.incumbent is None and problem.budgets:
-            _require_room(problem, tell)
+        if search.incumbent is None and problem.budgets:  # before thresholds are tried
+            totals = replace(problem, goals=problem.goals[len(problem.aims) :], budgets=())
+            every = Explorer(build_space(totals), tell=tell)
+            if every.rise() and is_beyond(every.graph().graph, problem.budgets):
+                raise InfeasibleError("no plan is within all budgets")
         return search.best(first_threshold(problem, options))
     except (StopError, KeyboardInterrupt) as stop:
         return unproven(plan_by_then(search.incumbent, stop), search.wide, search.bound)
@@ -426,14 +429,6 @@ def first_threshold(problem: States, options: Options) -> float:
     one = search.best()
     inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
     return (inside or one).objective[0]
-
-
-def _require_room(problem: States, tell: Watching) -> None:
-    """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
-    totals = problem.goals[len(problem.aims) :]
-    every = Explorer(build_space(replace(problem, goals=totals, budgets=())), tell=tell)
-    if every.rise() and is_beyond(every.graph().graph, problem.budgets):
-        raise InfeasibleError("no plan is within all budgets")
 
 
 def _in_all(problem: States, one: Solution | None, most: Sequence[float]) -> Solution | None:

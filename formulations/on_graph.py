@@ -52,7 +52,6 @@ from seqopt.graph.graph import (
     Contracted,
     Graph,
     _on_paths,
-    _Target,
     _target_sums,
     contracted,
     distances,
@@ -321,7 +320,14 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
     ``instance``: has ``asked``, the graph of its goals and caps, and ``goals``.
     """
     graph, goal = instance.asked, instance.goals[0]
-    found = _least_tail(graph, goal, choose, watch) if goal.kind == TAIL else choose(graph, watch)
+    if goal.kind == TAIL:
+        aim = WORST_TOTAL  # the tail of which one scenario may have all the weight
+        if goal.most < 1.0:
+            aim = cvar(max(0.0, 1.0 - 1.0 / (goal.most * len(goal.columns))))
+        least = least_total(graph, aim, cheapest_by(choose, watch), watch)
+        found = Choice(least.path, (least.bound,), watch.over, (tuple(least.weights.tolist()),))
+    else:
+        found = choose(graph, watch)
     if not found.path:
         raise TimeUpError("no path was found yet; give more time")
     values = path_values(graph, found.path)[: graph.goals]
@@ -346,15 +352,6 @@ def path_of_instance(instance: Any, choose: Choose, watch: Watch) -> Solution:
 def _without_rounding(value: float, bound: float) -> float:
     """Return a lower bound that is no larger than its value by rounding alone."""
     return value if value < bound <= tied(value) else bound
-
-
-def _least_tail(graph: Graph, goal: _Target, choose: Choose, watch: Watch) -> Choice:
-    """Return the path of least worst or tail total over scenarios, with their weights."""
-    aim = WORST_TOTAL  # the tail of which one scenario may have all the weight
-    if goal.most < 1.0:
-        aim = cvar(max(0.0, 1.0 - 1.0 / (goal.most * len(goal.columns))))
-    found = least_total(graph, aim, cheapest_by(choose, watch), watch)
-    return Choice(found.path, (found.bound,), watch.over, (tuple(found.weights.tolist()),))
 
 
 @dataclass(frozen=True, repr=False)

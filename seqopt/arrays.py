@@ -180,13 +180,13 @@ class KnownRows:
         self._known: dict[object, tuple[Ints, Floats]] = {}
         self.count = self.nbytes = 0
 
-    def known(self, key: object, codes: Ints) -> Floats:
-        """Return the first values (n,) of cached rows; NaN of others."""
+    def known(self, key: object, codes: Ints, column: int = 0) -> Floats:
+        """Return values (n,) of cached rows; NaN of others."""
         known, values = self._known.get(key, (codes[:0], None))
         if values is None or not len(known):
             return np.full(len(codes), np.nan)
         at = np.searchsorted(known, codes).clip(max=len(known) - 1)
-        return np.where(known[at] == codes, values[at, 0], np.nan)
+        return np.where(known[at] == codes, values[at, column], np.nan)
 
     def shared(self, other: KnownRows) -> int:
         """Return how many rows both have."""

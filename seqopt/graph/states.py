@@ -343,15 +343,8 @@ class States(Shown):
             return sum(problem.nbytes for problem in self.each)
         return self.sets.nbytes + self.screened.nbytes
 
-    def responses(
-        self, level: int, states: Ints, *, rough: bool = False
-    ) -> tuple[StateArrays, Bools]:
-        """Return states as amounts and filters see them, and which pass the filters.
-
-        ``states`` (n, c): as of the space; ``rough``: whether single precision is enough, except
-        close to a limit. Stability is evaluated later.
-        """
-        seen = self.seen(level, states, rough=rough)
+    def fitting(self, seen: StateArrays) -> Bools:
+        """Return which states pass the filters, (n,); stability is evaluated later."""
         fits = seen.possible.copy()
         for each in self.every_filter:
             if each.passes and not each.expensive:  # a filter without a test is kept by all moves
@@ -360,10 +353,13 @@ class States(Shown):
             if each.expensive:
                 rows = np.flatnonzero(fits)
                 fits[rows] = each.proven(seen.only(rows))
-        return seen, fits
+        return fits
 
     def seen(self, level: int, states: Ints, *, rough: bool = False) -> StateArrays:
-        """Return states as amounts and filters see them, before any filter is asked."""
+        """Return states (n, c) as amounts and filters see them, before any filter is asked.
+
+        ``rough``: whether single precision is enough, except close to a limit.
+        """
         held, most = _ascending(self._columns(states), self._caps)
         bricks = self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
@@ -466,7 +462,8 @@ class States(Shown):
         if self._by_candidates:
             out[:] = self.candidates.among(level, states)[:, None]
             return out, np.asarray(np.isfinite(out).all(axis=1))
-        found, within = self.responses(level, states, rough=rough)
+        found = self.seen(level, states, rough=rough)
+        within = self.fitting(found)
         found = found._replace(possible=within)
         for column, goal in enumerate(self.goals):
             if goal.of_criterion:
@@ -525,25 +522,23 @@ class States(Shown):
         """
         out = np.zeros((len(states), len(self.goals)))
         within, ahead = np.ones(len(states), dtype=bool), 0
+        bricks, key = self.space.bricks_at(level), ("together", *map(id, self.scenarios))
+        sets = [one.screened if rough else one.sets for one in self.each]
         for number, values in enumerate(asked):
             rows = np.flatnonzero(within & (out[:, 0] <= most))
             if not len(rows):
                 break
             if number == ahead:
                 ahead = min(3 * number + 1, len(asked))
-                self._fill(range(number, ahead), level, states[rows], rough=rough)
+                if bricks and not self.each[0]._by_candidates:
+                    if key not in self.answers:
+                        self.answers[key] = ScenarioSets(self.scenarios, self.resources)
+                    held = np.sort(self.each[0]._columns(states[rows]), axis=1)
+                    self.answers[key].fill(range(number, ahead), sets, bricks, held)
             found, ok = values(states[rows])
             out[rows], within[rows] = self.joined(out[rows], found, number), ok
         out[~within] = np.inf
         return out, within
-
-    def _fill(self, parts: Sequence[int], level: int, states: Ints, *, rough: bool) -> None:
-        """Compute the responses of states in some scenarios, by number, together."""
-        bricks, key = self.space.bricks_at(level), ("together", *map(id, self.scenarios))
-        if bricks and not self.each[0]._by_candidates:
-            sets = [one.screened if rough else one.sets for one in self.each]
-            together = self.answers.setdefault(key, ScenarioSets(self.scenarios, self.resources))
-            together.fill(parts, sets, bricks, np.sort(self.each[0]._columns(states), axis=1))
 
     def joined(self, before: Floats, values: Floats, number: int) -> Floats:
         """Return values (n, g) over scenarios with those of one more, the scenario of a number."""

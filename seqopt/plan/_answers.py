@@ -278,9 +278,12 @@ def _branches(problem: States, level: int, state: Ints) -> tuple[Floats, list[In
     """
     costs, trail = np.zeros(1), list[Ints]()
     while level < problem.space.levels and len(costs):
-        ((moves, _),) = problem.space.onward(level, trail[-1] if trail else state)
-        if trail and (np.bincount(moves.source) > 1).any():
-            break
+        reached = trail[-1] if trail else state
+        few = [reached[:1], reached] if trail else [reached]  # most decisions show in one state
+        for some in few:
+            ((moves, _),) = problem.space.onward(level, some)
+            if trail and (np.bincount(moves.source) > 1).any():
+                return costs, trail
         level += 1
         trail = [*(rows[moves.source] for rows in trail), moves.states]
         own = problem.candidates.of_branches(level, moves.states)

@@ -206,7 +206,7 @@ def _why_impossible(problem: States, look: Look) -> str:
 def _fault(problem: States, level: int, state: Ints) -> str:
     """Return which limits an infeasible state exceeds, or which filter it does not pass."""
     for one in problem.each or (problem,):
-        states, _ = one.responses(level, state)
+        states = one.seen(level, state)
         known = [(each, states.responses.get(each.response)) for each in one.limits]
         over = [
             f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"

@@ -260,7 +260,8 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         if asked.scene.has_arms:
             plan = required("with_postures")(asked, plan, solved)
         moved = None if plan.certificate is None else plan.certificate.moved
-        each = (most_moved(own, plan.steps) for own in plan.graph.scenarios or (plan.engine,))
+        worlds = plan.states.each or (plan.states,)
+        each = (most_moved(one.engine, plan.steps, one.screened) for one in worlds)
         return replace(plan, moved=moved or max(each, key=lambda moved: moved.share))
 
     def interrupted(plan: Plan) -> Plan:

@@ -506,18 +506,15 @@ class CandidateCosts:
         problem = self._problem
         if not (len(states) and problem.space.open_columns(level)):
             return np.zeros(len(states))
-        seen, fits = problem.responses(level, states, rough=problem.is_relative)
         if not problem.is_relative:
+            seen = problem.seen(level, states)
             costs = state_costs(problem.criterion, seen.responses, seen.bricks, seen.possible)
-        else:
-            *chosen, last = self._of(level).columns
-            every = self._of(level).states
-            every = every[(every[:, chosen] == states[0, chosen]).all(axis=1)]
-            every = every[np.argsort(every[:, last])]
-            found = problem.seen(level, every, rough=True).responses
-            costs = self._relative(level, problem.criterion, found)
-            costs = costs[np.searchsorted(every[:, last], states[:, last])]
-        return np.where(fits, costs, np.inf)
+            return np.where(problem.fitting(seen), costs, np.inf)
+        every = problem.space.candidates(level, states[0])
+        seen = problem.seen(level, every.states, rough=True)
+        costs = self._relative(level, problem.criterion, seen.responses)
+        own = (np.cumsum(every.possible) - 1)[every.rows(states)]
+        return np.where(problem.fitting(seen.only(own)), costs[own], np.inf)
 
     def charges(self, level: int, states: Ints) -> Floats:
         """Return what a search of one move alone is charged of states, (n, 2).

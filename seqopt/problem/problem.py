@@ -358,7 +358,12 @@ class Problem(Shown):
         del given["self"]
         parts = [given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion")]
         require_parts(*parts)
-        return replace(self, **_in_values(given, parts[0].network.scene))
+        if "limits" in given:
+            found = parse_limits(given["limits"], parts[0].network.scene)
+            for name, kind in (("limits", Limit), ("filters", Filter), ("paths", Resource)):
+                given[name] = tuple(each for each in found if isinstance(each, kind))
+        read = {name: READ[name](v) if name in READ else v for name, v in given.items()}
+        return replace(self, **read)
 
     @property
     def says_range(self) -> bool:
@@ -376,15 +381,6 @@ class Problem(Shown):
     def graphs(self) -> dict[tuple[Amount, ...], Any]:
         """Cached graphs of choices, with the responses that they computed."""
         return {}
-
-
-def _in_values(words: dict[str, Any], scene: Scene) -> dict[str, Any]:
-    """Return keywords with all words parsed into values."""
-    if "limits" in words:
-        found = parse_limits(words["limits"], scene)
-        for name, kind in (("limits", Limit), ("filters", Filter), ("paths", Resource)):
-            words[name] = tuple(each for each in found if isinstance(each, kind))
-    return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
 def _goals(given: Sequence[Amount | str] | str, least: int = 0) -> tuple[Amount, ...]:

@@ -41,7 +41,7 @@ from seqopt.work import Progress, Tell, _one_thread, map_ordered, worker_pool
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
-COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
+COMPILED = 3e6  # work from which on compiled loops save more than loading them takes
 # Engines of the last two runs of each thread of a worker: executors of users have no storage for
 # workers' data between tasks, each of which would build its engine again.
 _OF_THREAD = threading.local()
@@ -272,6 +272,15 @@ class GripSets:
         np.put_along_axis(forces, order, found[:, len(self.names) :], axis=1)
         return found[:, : len(self.names)], forces
 
+    def known(self, name: str, bricks: int, grips: Ints) -> Floats:
+        """Return a response (S,) of grips (S, r), by number; NaN where none is known."""
+        if name not in self.names:
+            return np.full(len(grips), np.nan)
+        order = np.argsort(self._number)
+        held = np.sort(order[np.searchsorted(self._number, grips, sorter=order)], axis=1)
+        codes, column = self._codes(self._number[held]), self.names.index(name)
+        return self._known.known((bricks, grips.shape[1]), codes, column)
+
     def _found(self, bricks: int, every: Ints) -> Floats:
         """Return responses and forces (S, R + r) of grips (S, r); those not cached are solved."""
 
@@ -386,19 +395,23 @@ class Moved(NamedTuple):
     step: int
 
 
-def most_moved(engine: Engine, steps: Sequence[Step]) -> Moved:
-    """Return the largest displacement of any node in any step, in single precision."""
+def most_moved(engine: Engine, steps: Sequence[Step], known: GripSets | None = None) -> Moved:
+    """Return the largest displacement of any node in any step, in single precision.
+
+    ``known``: grip sets of the engine, of which those that are solved are not solved again.
+    """
     scene = engine.network.scene
     alike = defaultdict[tuple[int, int], dict[tuple[int, ...], int]](dict)
-    far = linear_limit(scene)
-    found = [Moved(0.0, 0)]
+    far, found = linear_limit(scene), [Moved(0.0, 0)]
     for step in steps:
         if step.bricks:
             grips = scene.grip_numbers(step.grips, step.bricks)
             alike[step.bricks, len(grips)].setdefault(grips, step.number)
     for (bricks, count), numbers in alike.items():
         sets = np.array([*numbers], dtype=np.int64).reshape(len(numbers), count)
-        shift = solve_sets(engine, Block(bricks, sets, ("D_max",)))[:, 0]
+        shift = np.full(len(sets), np.nan) if known is None else known.known("D_max", bricks, sets)
+        new = np.isnan(shift)
+        shift[new] = solve_sets(engine, Block(bricks, sets[new], ("D_max",)))[:, 0]
         at = int(shift.argmax())
         found.append(Moved(float(shift[at]) / far, [*numbers.values()][at]))
     return max(found, key=lambda moved: moved.share)

@@ -567,13 +567,17 @@ class ScheduleSpace(StateRows):
         step = self.rules.steps[level - 1] if level else None
         return () if step is None else tuple(step.grips.index(OpenGrip(m)) for m in step.moves)
 
-    def candidates(self, level: int) -> Candidates:
-        """Return the choices of the grips that are open at a level."""
+    def candidates(self, level: int, beside: Ints | None = None) -> Candidates:
+        """Return the choices of the grips that are open at a level.
+
+        ``beside`` (robots,): a state whose grips are given, but for the one decided last.
+        """
         step, columns = self.rules.steps[level - 1], self.open_columns(level)
-        moves = [self.rules.moves[m] for m in step.moves]
+        columns = columns if beside is None else columns[-1:]
+        moves = [self.rules.moves[m] for m in step.moves[-len(columns) :]]
         places = tuple(np.array([self._place[n] for n in move.candidates]) for move in moves)
         grid = np.meshgrid(*places, indexing="ij")
-        states: Ints = np.tile(self._given(step), (grid[0].size, 1))
+        states: Ints = np.tile(self._given(step) if beside is None else beside, (grid[0].size, 1))
         states[:, columns] = np.stack([each.ravel() for each in grid], axis=1)
         possible = self._possible(step, states)
         shaped = possible.reshape(grid[0].shape)

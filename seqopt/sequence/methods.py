@@ -126,9 +126,12 @@ def _cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> lis
 
 def lies_along(network: Network) -> frozenset[int]:
     """Return the names of bricks along the structure: joints meet both of their inner nodes."""
-    edges = network.graph.edges.data()
-    met = {node for node, _, data in edges if data["kind"] is PartKind.JOINT}
-    return frozenset(brick.name for brick in network.scene.placed if met.issuperset(brick.nodes))
+    if "along" not in network.derived:  # asked for every brick
+        edges = network.graph.edges.data()
+        met = {node for node, _, data in edges if data["kind"] is PartKind.JOINT}
+        own = (brick.name for brick in network.scene.placed if met.issuperset(brick.nodes))
+        network.derived["along"] = frozenset(own)
+    return network.derived["along"]  # type: ignore[no-any-return]
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:

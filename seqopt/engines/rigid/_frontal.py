@@ -46,7 +46,7 @@ from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.work import _one_thread
 
-AT_ONCE = 24  # bricks that are eliminated together: blocks large enough for matrix products
+AT_ONCE = 12  # bricks that are eliminated together: blocks large enough for matrix products
 _SHRINKING = 1e-4  # largest correction from which on the next ones are foreseen
 MOST = 6  # corrections, after which an answer is given up
 _MARGIN = 10.0  # times more than the last correction shrank that the next one may be
@@ -109,16 +109,15 @@ class FrontalFactor:
         self.front = np.append(self.front, 6 * new + np.arange(6))
         self.matrix, self.load = np.pad(self.matrix, (0, 6)), np.pad(self.load, (0, 6))
         first, end = np.searchsorted(network.springs.since, [self.bricks, self.bricks + 1])
-        rows = slice(6 * first, 6 * end)
-        gap, stiffness = whole.deformation[rows], whole.stiffness[rows]
-        touched = np.unique(gap.indices)
+        rows, gap = slice(6 * first, 6 * end), whole.deformation
+        start, stiffness = gap.indptr[6 * first : 6 * end + 1], whole.stiffness[rows]
+        touched, column = np.unique(gap.indices[start[0] : start[-1]], return_inverse=True)
         at = np.searchsorted(self.front, touched)
-        each = gap[:, touched].toarray()
+        each = np.zeros((len(stiffness), len(touched)))  # to cut the sparse matrix takes longer
+        each[np.arange(len(each)).repeat(np.diff(start)), column] = gap.data[start[0] : start[-1]]
         self.matrix[np.ix_(at, at)] += each.T @ (stiffness[:, None] * each)
         self.load[at] += each.T @ (whole.moved[rows] * np.maximum(1.0, stiffness))
-        own = slice(6 * new, 6 * new + 6)
-        weight = network.inner_weight[2 * new : 2 * new + 2].ravel()
-        self.load[-6:] += whole.inner[own, own].T @ weight / whole.unit
+        self.load[-6:] += whole.weight[6 * new : 6 * new + 6]
         applied = network.applied(self.bricks, new).ravel()
         loaded = np.flatnonzero(applied)
         pull = applied[loaded] * whole.twist_unit[loaded] / whole.unit
@@ -229,33 +228,35 @@ def _solve_one(
 ) -> Solution:
     """Return how a partial structure answers to all that loads it while one set holds its nodes."""
     held, whole, gap = held_rows(parts, columns, compliance), factor.whole, parts.deformation
-    row, joints = 1 / np.maximum(1.0, parts.stiffness), len(parts.stiffness)
+    joints, given, right = len(parts.stiffness), parts.moved / parts.row, None
     ratio = whole.twist_unit[: len(parts.twist_unit)] / parts.twist_unit  # between both scalings
     unit = parts.unit / whole.unit
     rows, corner, off = held.rows, held.corner, np.zeros(len(held.corner))
     if compliance.moved is not None:
         width = len(held.force) // max(1, len(columns))
         off = held.force.T @ np.pad(compliance.moved[0], ((0, 0), (0, width - 3))).ravel()
-    state, forces, before = np.zeros(joints + len(parts.load)), np.zeros(len(off)), np.inf
+    state, forces = np.zeros(joints + len(parts.load)), np.zeros(len(off))
+    left, before = off, np.inf
     try:
         border = factor.border(rows * ratio, corner / unit)
     except np.linalg.LinAlgError as error:
         raise SolverError(f"{parts.bricks} bricks: {error}") from error
     for count in range(1 + MOST):
-        missing = -parts.apply(state[None])[0]
-        given = (missing[:joints] + parts.moved) / row
-        right = missing[joints:] + parts.load + rows.T @ forces + gap.T @ given
-        left = off - rows @ state[joints:] - corner @ forces
-        moved, more = factor.solve(border, right * ratio * unit if count else None, left)
+        if count:
+            missing = -parts.apply(state[None])[0]
+            given = (missing[:joints] + parts.moved) / parts.row
+            right = missing[joints:] + parts.load + rows.T @ forces + parts.borne @ given
+            right *= ratio * unit
+            left = off - rows @ state[joints:] - corner @ forces
+        moved, more = factor.solve(border, right, left)
         change = np.append(given - parts.stiffness * (gap @ (moved * ratio)), moved * ratio)
         state, forces = state + change, forces + more / unit
-        size = sizes(parts, change[None])[0]  # the next correction is as much smaller
+        size, reached = sizes(parts, np.stack([change, state]))  # the next is as much smaller
         share, before = min(1.0, _MARGIN * np.max(size / np.maximum(before, TINY))), size
         if not count:
             continue
-        reached = sizes(parts, state[None])
-        small = are_small(parts, reached, size[None], _SHRINKING)[0]  # not shrunk by chance
-        if small and are_small(parts, reached, share * size[None], largest)[0]:
+        small = are_small(parts, reached[None], size[None], _SHRINKING)[0]  # not shrunk by chance
+        if small and are_small(parts, reached[None], share * size[None], largest)[0]:
             wrench, twist = unscaled(parts, state[None])
             force = held.force @ (forces * parts.unit)
             return Solution(twist, wrench, *borne(force[None], len(columns), compliance))

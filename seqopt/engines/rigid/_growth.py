@@ -126,6 +126,7 @@ class Growth:
     def reach(self, bricks: int) -> None:
         """Let a number of bricks stand, at most the tree's; fewer than before are begun anew."""
         if bricks < self.bricks:
+            self.wrench[:] = 0.0  # springs not of the tree act on all rows
             self._start()
         while self.bricks < bricks:
             weighed = [each.copy() for each in self._answers(0)]
@@ -138,10 +139,13 @@ class Growth:
                 closing, changes = self._close(others)
             self._before = _Before(weighed, loss, closing, changes)
 
+    def reaches(self, bricks: int) -> bool:
+        """Return whether a brick count is answered without beginning anew."""
+        return bricks >= self.bricks - (self.remembers and self._before is not None)
+
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Floats]:
         """Return twists and wrenches (1 + kh, n) by the weight and unit wrenches, and loss (h,)."""
-        last = self.remembers and self._before is not None
-        if not self.bricks - last <= bricks <= self.bricks:
+        if bricks > self.bricks or not self.reaches(bricks):
             self.reach(bricks)
         rows: slice | Ints = slice(1 + 6 * bricks)
         if len(held) < bricks:
@@ -167,7 +171,6 @@ class Growth:
         return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
 
     def _start(self) -> None:
-        self.wrench[:] = 0.0  # springs not of the tree act on all rows
         self.bricks, self._left = 0, 1.0  # rounding when the twists were summed anew
         self._before = None
         self._tie(np.arange(0))

@@ -67,19 +67,18 @@ class Shared(FrozenValue):
 class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
-    ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
-    ``network.inner``, m; ``deformation`` (6s, 6b): scaled, of the
-    acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
-    ``load`` (6b,): weight and loads, scaled; ``moved`` (6s,): what the ground's movement adds to
-    the joints' equations; ``acting`` (s,); ``twist_unit`` (6b,), ``wrench_unit`` (6s,): scaled
-    twists to m and rad, wrenches to N and N m; ``unit``: N/m.
+    ``deformation`` (6s, 6b): scaled, of the acting springs, in their own axes, for scaled twists;
+    ``stiffness`` (6s,): over ``unit``; ``weight``, ``load`` (6b,): of the bricks, and with all
+    other loads, scaled; ``moved`` (6s,): what the ground's movement adds to the joints' equations;
+    ``acting`` (s,); ``twist_unit`` (6b,), ``wrench_unit`` (6s,): scaled twists to m and rad,
+    wrenches to N and N m; ``unit``: N/m.
     """
 
     network: Network
     bricks: int
-    inner: sparse.csr_array
     deformation: sparse.csr_array
     stiffness: Floats
+    weight: Floats
     load: Floats
     moved: Floats
     acting: Ints
@@ -88,9 +87,27 @@ class Ungripped(FrozenValue):
     unit: float
 
     @cached_property
+    def inner(self) -> sparse.csr_array:
+        """Displacements of the inner nodes for scaled twists, (6b, 6b), as `Shared`, m."""
+        whole, size = share(self.network).inner, 6 * self.bricks
+        own = whole.indices[: 6 * size]
+        entries = whole.data[: 6 * size] * self.twist_unit[own], own, whole.indptr[: size + 1]
+        return frozen(sparse.csr_array(entries, shape=(size, size)))
+
+    @cached_property
+    def row(self) -> Floats:
+        """By which equations of joints are multiplied, (6s,): it keeps them of order one."""
+        return frozen(1 / np.maximum(1.0, self.stiffness))
+
+    @cached_property
+    def borne(self) -> sparse.csc_array:
+        """Loads (6b,) that wrenches bear, scaled: of each brick those of its springs."""
+        return frozen(self.deformation.T)
+
+    @cached_property
     def matrix(self) -> sparse.csc_array:
         """The system without grips, (6s + 6b,), column by column."""
-        gap, row = self.deformation, 1 / np.maximum(1.0, self.stiffness)  # keeps them of order one
+        gap, row = self.deformation, self.row
         joints, moves = gap.shape
         first = gap.indptr[:-1] + np.arange(joints)  # of a joint's column, the joint itself
         others = np.arange(gap.nnz) + np.repeat(np.arange(1, joints + 1), np.diff(gap.indptr))
@@ -106,11 +123,9 @@ class Ungripped(FrozenValue):
 
     def apply(self, states: Floats) -> Floats:
         """Return the products (S, 6s + 6b) of the system without grips with states."""
-        joints, row = len(self.stiffness), 1 / np.maximum(1.0, self.stiffness)
-        parted = (self.deformation @ states[:, joints:].T).T
-        wrench = states[:, :joints]
-        borne = (self.deformation.T @ wrench.T).T
-        return np.hstack([row * wrench + row * self.stiffness * parted, -borne])
+        wrench, twist = np.split(states, [len(self.stiffness)], axis=1)
+        parted, borne = (self.deformation @ twist.T).T, (self.borne @ wrench.T).T
+        return np.hstack([self.row * (wrench + self.stiffness * parted), -borne])
 
     @cached_property
     def motion(self) -> sparse.csr_array:
@@ -152,19 +167,17 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
     at = gap.indices[: starts[-1]]
     lengths = np.repeat(np.tile(lever, len(acting)), np.diff(starts)) * twist_unit[at]
     scaled = gap.data[: starts[-1]] * lengths, at, starts  # all components made lengths
-    size, own = 6 * bricks, shared.inner.indices[: 36 * bricks]
-    nodes = shared.inner.data[: 36 * bricks] * twist_unit[own], own, shared.inner.indptr[: size + 1]
-    inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
-    weight = network.inner_weight[: 2 * bricks].ravel()
-    applied = network.applied(bricks).ravel()
+    inner = shared.inner.data[: 36 * bricks].reshape(bricks, 6, 6)
+    weight = np.einsum("bij,bi->bj", inner, network.inner_weight[: 2 * bricks].reshape(bricks, 6))
+    weight = weight.ravel() * twist_unit / unit
     row = stiffness / np.maximum(1.0, stiffness)
     return Ungripped(
         network=network,
         bricks=bricks,
-        inner=inner,
-        deformation=sparse.csr_array(scaled, shape=(rows, size)),
+        deformation=sparse.csr_array(scaled, shape=(rows, 6 * bricks)),
         stiffness=stiffness,
-        load=inner.T @ weight / unit + applied * twist_unit / unit,
+        weight=weight,
+        load=weight + network.applied(bricks).ravel() * twist_unit / unit,
         moved=row * (shared.moved[acting] * lever).ravel(),
         acting=acting,
         twist_unit=twist_unit,
@@ -271,9 +284,10 @@ def edge_forces(network: Network, wrench: Floats, load: Floats) -> Floats:
     sets, bricks = len(load), load.shape[1] // 2
     statics, edges = share(network).statics, network.count_edges(bricks)
     through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
-    carried = (statics.edge_of_spring[:edges] @ through.T).T
-    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
-    return np.asarray(carried)
+    pull = np.zeros((sets, statics.edge_of_load.shape[1]))  # to cut the matrix takes longer
+    pull[:, : 6 * bricks] = load.reshape(sets, 6 * bricks)
+    carried = statics.edge_of_spring @ through.T + statics.edge_of_load @ pull.T
+    return np.asarray(carried[:edges].T)
 
 
 def reactions(network: Network, wrench: Floats) -> Floats:
@@ -326,13 +340,13 @@ def held_rows(parts: Ungripped, grips: Ints, compliance: GripCompliance = RIGID)
     arm = network.node_position[network.inner.ravel()[grips]] - network.centroid[brick]
     motion = np.zeros((len(grips), 3, parts.bricks, 6))
     motion[np.arange(len(grips)), :, brick] = point_motion(arm)
-    directions = [np.eye(3)] * len(grips)
-    for i in range(len(grips)):
-        if (brick[:i] == brick[i]).any():  # it forbids nothing along the line to the other grip
-            step = np.diff(network.node_position[network.inner[brick[i]]], axis=0)
-            directions[i] = linalg.null_space(step)
-    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
-    rows = force.T @ motion.reshape(3 * len(grips), 6 * parts.bricks)
+    rows, force = motion.reshape(3 * len(grips), 6 * parts.bricks), np.eye(3 * len(grips))
+    ends = network.node_position[network.inner[brick]]
+    doubles = [i for i in range(len(grips)) if (brick[:i] == brick[i]).any()]
+    if doubles:  # they forbid nothing along the line to the other grip on their brick
+        own = {i: linalg.null_space(np.diff(ends[i], axis=0)) for i in doubles}
+        force = linalg.block_diag(*(own.get(i, np.eye(3)) for i in range(len(grips))))
+        rows = force.T @ rows
     corner = np.zeros((force.shape[1], force.shape[1]))
     if compliance.matrix is not None:
         rows, force, flexibility = _with_flexibility(parts, grips, rows, force, compliance)
@@ -540,9 +554,9 @@ def are_small(parts: Ungripped, size: Floats, change: Floats, largest: float) ->
 
 def sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
-    both = np.split(states, [len(parts.wrench_unit)], axis=1)
-    ways = [np.abs(part[:, way::6]).max(axis=1, initial=0.0) for part in both for way in range(6)]
-    return np.asarray(np.stack(ways, axis=1).reshape(len(states), 4, 3).max(axis=2))
+    both = np.split(np.abs(states), [len(parts.wrench_unit)], axis=1)
+    ways = [e.reshape(len(e), e.shape[1] // 6, 6).max(axis=1, initial=0.0) for e in both]
+    return np.asarray(np.hstack(ways).reshape(len(states), 4, 3).max(axis=2))
 
 
 def add_products(start: Floats, matrix: sparse.csr_array, factors: Floats) -> Floats:

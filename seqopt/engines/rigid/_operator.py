@@ -94,11 +94,13 @@ class ResponseMaps(FrozenValue):
     @cached_property
     def motion(self) -> sparse.csr_array:
         """How twists move nodes, (3n, 6b)."""
-        every = self.scene.motion
-        moved = every.data * np.where(self.scene.since > self.bricks, 2.0, 1.0)
-        alone = sparse.csr_array((moved, every.indices, every.indptr), shape=every.shape)
-        nodes = self.scene.network.count_nodes(self.bricks)
-        return frozen(alone[: 3 * nodes, : 6 * self.bricks])
+        every, bricks = self.scene.motion, self.bricks
+        first = every.indptr[: 3 * self.scene.network.count_nodes(bricks) + 1]
+        at, moved = every.indices[: first[-1]], every.data[: first[-1]]
+        there = at < 6 * bricks
+        moved = moved * there * np.where(self.scene.since[: first[-1]] > bricks, 2.0, 1.0)
+        entries = moved, at * there, first
+        return frozen(sparse.csr_array(entries, shape=(len(first) - 1, 6 * bricks)))
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""

@@ -213,7 +213,8 @@ class ComplianceEngine(NamedEngine):
         """Return the fields of grip sets, corrected where the operator is not accurate enough."""
         size = len(self.network.inner)
         self.answered += len(columns)
-        if size >= max(_LARGE, _EACH * len(columns)) and "_builder" not in vars(self):
+        begun = "_builder" in vars(self) and self._builder.growth.reaches(bricks)
+        if size >= max(_LARGE, _EACH * len(columns)) and not begun:
             with suppress(SolverError):  # of what blocks of the stiffness do not answer
                 last = _SCREEN if want & Want.SCREEN else _MIXED.LAST_CORRECTION
                 answer = self._frontal.solve(bricks, columns, compliance, last)
@@ -245,6 +246,7 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self.network, bricks, grips), np.asarray(grips)
         compliance = read_compliance(self.network, columns, numbers, None)
+        compiled |= self._grown is not None  # they are loaded already
         if not (compiled and compliance.rigid and COMPILES):
             fields = self._found(bricks, columns, compliance, want)
             return _extremes_in(require_finite(fields, bricks, numbers), want)
