@@ -34,12 +34,10 @@ from seqopt.scene.scene import Scene
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import (
     CAP,
-    DIRECTIONS,
     EXACT,
     FINE,
     GAP,
     LARGEST_FORCE,
-    NEAR,
     ROUNDING,
     Answer,
     Case,
@@ -48,6 +46,7 @@ from seqopt.stability.limit_analysis import (
     hulls,
     is_finite,
     sideways,
+    turned,
     violation,
 )
 from seqopt.stability.verdict import FALLS, OPEN, STANDS
@@ -274,13 +273,11 @@ class HeldStates:
 
 
 class TiltedStates:
-    """One structure, whose grips are all that may ever be held, with a mortar, pulled sideways."""
+    """One structure, with all grips that may ever be held, as in a case, pulled sideways."""
 
-    def __init__(
-        self, assembly: Assembly, mortar: Mortar, up: Vector, compiled: CompileHeld
-    ) -> None:
+    def __init__(self, assembly: Assembly, case: Case, up: Vector, compiled: CompileHeld) -> None:
         self._assembly, self._compile = assembly, compiled
-        self._cases = sideways(bonded(assembly, mortar).fixed(), up, FINE)
+        self._cases = sideways(case, up, FINE)
         self._states: dict[int, HeldStates] = {}
         self._fell = np.zeros(FINE, dtype=np.int64)  # how many sets by each direction
 
@@ -351,7 +348,7 @@ class Proofs:
     """
 
     upright: dict[tuple[Part, Mortar], HeldStates] = field(default_factory=dict)
-    tilted: dict[tuple[Part, Mortar], TiltedStates] = field(default_factory=dict)
+    tilted: dict[tuple[Part, Mortar, Case], TiltedStates] = field(default_factory=dict)
     keeps: bool = False
     answers: dict[Part, list[tuple[Answer, Floats]]] = field(default_factory=dict)
 
@@ -426,11 +423,13 @@ class Screen:
             found = np.where(fall, FALLS, np.where(stand, STANDS, OPEN)).astype(np.int8)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):
-                if key not in known.tilted:
-                    pulled = states.assembly, self.mortar, self.network.scene.up, self._compile
-                    known.tilted[key] = TiltedStates(*pulled)
+                pull, case = float(np.tan(self.tilt)), bonded(states.assembly, self.mortar).fixed()
+                case = turned(case, pull) if len(states.assembly.applied) else case
+                if (*key, case) not in known.tilted:
+                    pulled = states.assembly, case, self.network.scene.up, self._compile
+                    known.tilted[*key, case] = TiltedStates(*pulled)
                 asked = places[rows], loads[rows]
-                found[rows] = known.tilted[key].survive(np.tan(self.tilt), *asked, solve=solve)
+                found[rows] = known.tilted[*key, case].survive(pull, *asked, solve=solve)
             out[own] = found
         return out
 
@@ -552,31 +551,6 @@ class Margins:
 
         (bracket,), assembly = self._brackets("grip", cases, bricks, held, payload)
         return np.where(bracket[:, [0]] >= CAP, np.inf, bracket) * assembly.scales[0]
-
-    def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
-        """Return the tilt that grip sets survive in every direction.
-
-        Result (S, 2): brackets, rad, of `Stability.tilt`; NaN where it is not proven to stand.
-        """
-        screen = self.screens[self.mortar.friction]
-        out = np.full((len(np.asarray(held)), 2), np.nan)
-        rows = np.flatnonzero(screen.stands(bricks, held, payload) == STANDS)
-        for count in (DIRECTIONS, FINE):
-            if not len(rows):
-                break
-
-            def pulls(assembly: Assembly, count: int = count) -> list[Case]:
-                return sideways(bonded(assembly, self.mortar).fixed(), self.network.scene.up, count)
-
-            grips = np.asarray(held)[rows], _of_rows(payload, rows)
-            brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, *grips)[0])
-            low, high = brackets[..., 0], brackets[..., 1]
-            known = np.where(np.isfinite(low), np.maximum(low, 0.0), np.nan)
-            least = np.nan_to_num(hulls(2 * np.pi * np.arange(count) / count, known.T)[0])
-            most = np.maximum(high.min(axis=0), 0.0)
-            out[rows] = np.arctan(np.stack([least, most], axis=1))
-            rows = rows[out[rows, 0] < (1 - NEAR) * out[rows, 1]]
-        return out
 
     def friction(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, step: float = 2.0**-7

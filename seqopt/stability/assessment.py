@@ -34,7 +34,7 @@ from seqopt.stability.limit_analysis import (
     Prover,
     Sense,
     compile_equilibrium,
-    safe_pull,
+    safe_turn,
 )
 from seqopt.stability.verdict import ASSESSED, Verdict
 from seqopt.work import Tell, with_progress
@@ -67,9 +67,10 @@ class Stability(Shown, FrozenValue):
         all loads; NaN if it does not stand.
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
-        Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
-        less than the largest such tilt by what `safe_pull` leaves, and for bonds and for grips at
-        their payload by what weighs less once it is turned.
+        Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived; other
+        loads keep their size and direction. It is less than the largest such tilt by what
+        `safe_pull` leaves, and for bonds and for grips at their payload by what weighs less once it
+        is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
         payload is enough, 0 if nothing grips, NaN where props only push.
@@ -150,7 +151,7 @@ def assess(
     stand = prove(growing)
     verdict = _verdict_of(stand)
     fixed, stands = growing.fixed(), verdict is Verdict.STANDS
-    pulls, worst = safe_pull(prove, fixed, up) if stands and "tilt" in margins else ([], np.nan)
+    pulls, worst = safe_turn(prove, fixed, up) if stands and "tilt" in margins else ([], np.nan)
     failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
     known = failure.value < CAP if pulls else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))

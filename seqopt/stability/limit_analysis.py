@@ -314,6 +314,32 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
         pulls.append(prove(_pulled(fixed, up, angle)))
 
 
+def turned(fixed: Case, pull: float) -> Case:
+    """Return a case in which gravity is turned by as much as a pull turns it, over its share left.
+
+    What else loads an assembly does not turn: it counts as much more as less of gravity is left.
+    """
+    return replace(fixed, applied=(float(np.hypot(1.0, pull)), 0.0))
+
+
+def safe_turn(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], float]:
+    """Return what `safe_pull` does, and beside loads a pull that is survived as a `turned` case.
+
+    Its value is sought between those that are survived so and those that are not.
+    """
+    pulls, worst = safe_pull(prove, fixed, up)
+    if not len(prove.assembly.applied):
+        return pulls, worst
+    safe, value = 0.0, worst
+    for _ in range(_MORE):
+        _, again = safe_pull(prove, turned(fixed, value), up)
+        safe = value if again >= value else safe
+        if value <= again <= (1 + GAP) * value:
+            break
+        value = again if again > safe else float(np.tan(0.5 * np.arctan([safe, value]).sum()))
+    return pulls, safe
+
+
 def hulls(angles: Floats, pulls: Floats) -> tuple[Floats, Floats]:
     """Return the pull that is survived in every direction, by what is in some, and its angle.
 

@@ -1,7 +1,7 @@
 """Textbook limits: friction, overhangs, arches, hinges and levers in closed form."""
 
 from dataclasses import replace
-from math import atan, cos, radians, sin, sqrt, tan
+from math import acos, atan, cos, radians, sin, sqrt, tan
 
 import numpy as np
 import pandas as pd
@@ -10,12 +10,13 @@ import pytest
 from experiments.stability.classical import CASES, FEW, faults, ladder, push, row, wall
 from experiments.stability.parts.blocks import stack
 from formulations.contact.held_equilibrium import compile_held
-from seqopt.contact.assembly import Assembly
+from seqopt.contact.assembly import Assembly, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
+from seqopt.network.network import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability._screens import STANDS, Margins, Screen, _decided
+from seqopt.stability._screens import FALLS, STANDS, Margins, Screen, _decided
 from seqopt.stability.assessment import assess
-from seqopt.stability.limit_analysis import EXACT
+from seqopt.stability.limit_analysis import EXACT, NEAR
 from seqopt.stability.verdict import Verdict
 from tests.builders import block, held, lacking
 
@@ -180,15 +181,23 @@ def test_linear_programs_know_the_lever():
     assert not stands(hand, rough, places, np.array([[0.9999 * least]]))
 
 
+@pytest.mark.parametrize("wind", [0.0, 0.1, 0.3])
+def test_wind_keeps_its_force_where_a_block_is_tilted(wind):
+    """It tips where cos t = 5/3 (sin t + wind); a pull by tan t would count wind as less."""
+    scene = replace(block((0.3, 0.5, 0.5)), wind=(wind, 0.0, 0.0))
+    network = build_network(scene)
+    tips = acos(0.5 * wind / sqrt(0.3**2 + 0.5**2)) - atan(0.5 / 0.3)
+    tilt = assess(step_assembly(network, 1, (None,) * len(scene.robots)), ROUGH).tilt
+    assert (1 - NEAR) * tips <= tilt <= tips * (1 + 1e-4)
+    assert tan(tips) + wind < 0.6 * (1 - NEAR) or not wind  # the control
+    stands = [Screen(network, ROUGH, share * tips).stands(1, [[0]])[0] for share in (0.997, 1.001)]
+    assert stands == [STANDS, FALLS]
+
+
 def test_margins_of_a_brick_on_the_ground():
-    """It tips over its lower edge, or slides; a robot above it need not lift."""
+    """A robot above it need not lift; where the ground leans, it slides."""
     scene = replace(block(), robots=(Robot(name="rob1", payload=100.0),))
-    margins = Margins(scene, Mortar(friction=0.5))
-    size = scene.bricks[0].dimensions
-    tilt = margins.tilt(1, [[0]])[0]
-    assert tilt[0] <= np.arctan(0.5) + 1e-9 <= tilt[1] + 2e-9
-    assert size[1] / size[2] > 0.5  # it slides before it tips
-    assert margins.grip(1, [[1]])[0] == pytest.approx(0.0, abs=1e-6)
+    assert Margins(scene, DRY).grip(1, [[1]])[0] == pytest.approx(0.0, abs=1e-6)
     leaning = block(lean=radians(20))
     friction = Margins(leaning, DRY).friction(1, [[0]], step=1e-4)[0]
     assert friction[0] <= tan(radians(20)) <= friction[1]
