@@ -568,7 +568,8 @@ class Margins:
             if friction not in self.screens:
                 mortar = replace(self.mortar, friction=friction)
                 self.screens[friction] = Screen(self.network, mortar)
-            found = self.screens[friction].stands(bricks, sets[rows], _of_rows(payload, rows))
+            own = payload if payload is None or np.ndim(payload) < 2 else np.asarray(payload)[rows]
+            found = self.screens[friction].stands(bricks, sets[rows], own)
             stand, fall = rows[found == STANDS], rows[found == FALLS]
             out[stand, 1] = np.minimum(out[stand, 1], friction)
             out[fall, 0] = np.maximum(out[fall, 0], friction)
@@ -609,10 +610,3 @@ def _narrow(bracket: Floats) -> Bools:
     scale = np.maximum(1.0, np.where(np.isfinite(bracket[:, 0]), np.abs(bracket[:, 0]), 0.0))
     near = bracket[:, 1] - bracket[:, 0] <= GAP * scale
     return np.asarray(near | (bracket[:, 0] >= CAP))
-
-
-def _of_rows(payload: ArrayLike | None, rows: Ints) -> ArrayLike | None:
-    """Select the payloads of grip sets."""
-    if payload is None or np.ndim(payload) < 2:
-        return payload
-    return np.asarray(payload)[rows]

@@ -149,7 +149,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
         "import numpy as np\n"
         "from seqopt.engines.rigid._extremes import _add_six as add\n"
         "out = np.zeros(2)\n"
-        "add(out, np.ones((6, 2)), 0, np.ones(6))\n"
+        "add(out, np.ones((6, 1, 2)), 0, np.ones(6))\n"
         "print(out[0], type(add._cache).__name__)\n"
     )
     command = [sys.executable, "-W", "error", "-c", code]

@@ -44,7 +44,7 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 class Grown(NamedTuple):
-    """What unit wrenches on bricks mean, and how inner nodes (B, 6, 6) follow their bricks."""
+    """What unit wrenches on bricks mean, as of `Growth`, and how inner nodes (B, 6, 6) follow."""
 
     twist: Floats
     wrench: Floats
@@ -92,7 +92,7 @@ class Part(NamedTuple):
     """A partial structure: counts, and what `ResponseMaps.inner` says."""
 
     bricks: int
-    wrenches: int  # numbers: six for every spring that acts
+    forces: int  # numbers: three for every spring that acts
     edges: int
     nodes: int  # none where nobody asks how far they move
     at_second: Floats
@@ -106,7 +106,8 @@ def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
     along = np.zeros((3, outer.shape[0]))
     along[outer.col % 6, outer.row] = outer.data
     rows = through.indptr.astype(np.int64), through.indices.astype(np.int64), through.data
-    edges = Edges(6 * spring[spring >= 0], along, *rows)
+    rows[1][:] -= 3 * (rows[1] // 6)  # forces of springs stand without moments
+    edges = Edges(3 * spring[spring >= 0], along, *rows)
     entries = scene.motion.tocoo()
     start, at = (part.astype(np.int64) for part in (scene.motion.indptr, scene.motion.indices))
     pairs = np.unique(np.stack([entries.col // 6, entries.row // 3]), axis=1)
@@ -116,7 +117,7 @@ def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
     reach = np.maximum.reduceat(arm, first[:-1])  # each has its inner nodes at least
     motion = Motion(start, at, scene.motion.data, scene.since, first, node, reach)
     moment = np.ascontiguousarray(scene.support[:, :, 3:])
-    return edges, motion, Ends(6 * network.springs.support, moment)
+    return edges, motion, Ends(3 * network.springs.support, moment)
 
 
 class GrownExtremes:
@@ -127,7 +128,7 @@ class GrownExtremes:
 
     def __init__(self, builder: OperatorBuilder) -> None:
         self._network, self._growth = builder.network, builder.growth
-        self._grown = Grown(self._growth.twist, self._growth.wrench, builder.nodes)
+        self._grown = Grown(self._growth.twist[:, None], self._growth.wrench, builder.nodes)
         self._scene, self._maps = builder.maps, maps_by_entry(builder.maps)
         self._part = Part(0, 0, 0, 0, np.empty(0), np.empty((0, 3)))
         self._growth.remembers = True
@@ -140,14 +141,16 @@ class GrownExtremes:
             self._growth.reach(bricks)
         network, (twist, _, nodes) = self._network, self._grown
         acting = int(np.searchsorted(network.springs.since, bricks, side="right"))
-        counts = bricks, 6 * acting, network.count_edges(bricks), network.count_nodes(bricks)
+        counts = bricks, 3 * acting, network.count_edges(bricks), network.count_nodes(bricks)
         _, axis, at_second = ResponseMaps(self._scene, bricks).inner
         self._part = Part(*counts, at_second, axis)
-        own, every = twist[1 : 1 + 6 * bricks, : 6 * bricks], np.arange(bricks)
+        own, every = twist[1 : 1 + 6 * bricks, 0, : 6 * bricks], np.arange(bricks)
         blocks = own.reshape(bricks, 6, bricks, 6)[every, :, every]
         self.doubts = Doubts(
             np.einsum("nip,npq,niq->ni", nodes[:bricks], blocks, nodes[:bricks]).ravel(),
-            np.einsum("nip,np->ni", nodes[:bricks], twist[0, : 6 * bricks].reshape(-1, 6)).ravel(),
+            np.einsum(
+                "nip,np->ni", nodes[:bricks], twist[0, 0, : 6 * bricks].reshape(-1, 6)
+            ).ravel(),
             np.repeat(self._growth.loss[:bricks], nodes.shape[1]),
         )
 
@@ -183,11 +186,11 @@ def _solve_grips(grown: Grown, columns: Ints, across: Floats) -> tuple[Floats, F
     at = 6 * (columns // 2)[..., None] + np.arange(6)
     rows = 3 * (columns % 2)[..., None] + np.arange(3)
     nodes = grown.nodes[(columns // 2)[..., None], rows]  # (S, r, 3, 6)
-    moved = grown.twist[1 + at[:, :, None, :, None], at[:, None, :, None]]  # (S, r, r, 6, 6)
+    moved = grown.twist[1 + at[:, :, None, :, None], 0, at[:, None, :, None]]  # (S, r, r, 6, 6)
     flexibility = nodes[:, :, None] @ moved @ nodes[:, None].swapaxes(3, 4)
     system = np.empty((count + 1, count, sets))
     system[:count] = flexibility.transpose(1, 3, 2, 4, 0).reshape(count, count, sets)
-    dead = nodes @ grown.twist[0, at][..., None]
+    dead = nodes @ grown.twist[0, 0, at][..., None]
     system[count] = -dead.reshape(sets, count).T
     brace(system[:count], pairs_of(across, columns), 3)
     return solve_positive(system)
@@ -214,27 +217,28 @@ def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
 @_compiled()
 def _add_six(out: Floats, rows: Floats, first: int, much: Floats) -> None:
     """Add six neighboring rows, so much of each."""
-    a, b, c = rows[first], rows[first + 1], rows[first + 2]
-    d, e, f = rows[first + 3], rows[first + 4], rows[first + 5]
+    a, b, c = rows[first, 0], rows[first + 1, 0], rows[first + 2, 0]
+    d, e, f = rows[first + 3, 0], rows[first + 4, 0], rows[first + 5, 0]
     p, q, r, s, t, u = much[0], much[1], much[2], much[3], much[4], much[5]
     for n in range(len(out)):
         out[n] += (p * a[n] + q * b[n] + r * c[n]) + (s * d[n] + t * e[n] + u * f[n])
 
 
 @_compiled()
-def _sum_rows(moved: Floats, carried: Floats, grown: Grown, at: Ints, force: Floats) -> None:
-    """Find the twists and wrenches under the weight and forces at nodes."""
-    pull = np.empty(6)
-    moved[:] = grown.twist[0, : len(moved)]
-    carried[:] = grown.wrench[0, : len(carried)]
+def _sum_rows(
+    moved: Floats, carried: Floats, pull: Floats, grown: Grown, at: Ints, force: Floats
+) -> None:
+    """Find twists and forces of springs under the weight and forces at nodes, (r, 6) on bricks."""
+    moved[:] = grown.twist[0, 0, : len(moved)]
+    carried[:] = grown.wrench[0, 0, : len(carried)]
     for i in range(len(at)):
         brick, first = at[i] // 2, 3 * (at[i] % 2)
         for p in range(6):
-            pull[p] = 0.0
+            pull[i, p] = 0.0
             for a in range(3):
-                pull[p] += grown.nodes[brick, first + a, p] * force[3 * i + a]
-        _add_six(moved, grown.twist, 1 + 6 * brick, pull)
-        _add_six(carried, grown.wrench, 1 + 6 * brick, pull)
+                pull[i, p] += grown.nodes[brick, first + a, p] * force[3 * i + a]
+        _add_six(moved, grown.twist, 1 + 6 * brick, pull[i])
+        _add_six(carried, grown.wrench, 1 + 6 * brick, pull[i])
 
 
 @_compiled("nnan", "nsz")
@@ -242,10 +246,8 @@ def _extremes_outside(carried: Floats, edges: Edges, part: Part) -> tuple[float,
     """Return the least and the largest force of all edges but inner ones."""
     least, most = np.inf, -np.inf
     for e in range(part.edges - part.bricks):
-        j, tension = edges.first[e], 0.0
-        if j < len(carried):  # else its spring does not act yet
-            x, y, z = edges.along[0, e], edges.along[1, e], edges.along[2, e]
-            tension = x * carried[j] + y * carried[j + 1] + z * carried[j + 2]
+        j, x, y, z = edges.first[e], edges.along[0, e], edges.along[1, e], edges.along[2, e]
+        tension = x * carried[j] + y * carried[j + 1] + z * carried[j + 2]
         least, most = min(least, tension), max(most, tension)
     return least, most
 
@@ -258,8 +260,7 @@ def _pull_bricks(
     for b in range(part.bricks):
         total = part.at_second[b]
         for k in range(edges.start[b], edges.start[b + 1]):
-            if edges.at[k] < len(carried):
-                total += edges.much[k] * carried[edges.at[k]]
+            total += edges.much[k] * carried[edges.at[k]]
         tension[b] = total
     for i in range(len(at)):
         for a in range(3):
@@ -277,24 +278,22 @@ def _pull_bricks(
 
 
 @_compiled("nnan", "nsz")
-def _square(moved: Floats, motion: Motion, node: int) -> float:
+def _square(moved: Floats, motion: Motion, bricks: int, node: int) -> float:
     """Return the square of how far a node moves."""
     square = 0.0
     for row in range(3 * node, 3 * node + 3):
         total = 0.0
         for k in range(motion.start[row], motion.start[row + 1]):
-            if motion.at[k] < len(moved):
-                alone = 6 * motion.since[k] > len(moved)
-                total += motion.much[k] * moved[motion.at[k]] * (1.0 + alone)
+            total += motion.much[k] * moved[motion.at[k]] * (1.0 + (motion.since[k] > bricks))
         square += total * total
     return square
 
 
 @_compiled("nnan", "nsz")
-def _farthest(moved: Floats, motion: Motion, nodes: int, first: int) -> tuple[float, int]:
+def _farthest(moved: Floats, motion: Motion, part: Part, first: int) -> tuple[float, int]:
     """Return the square of how far any node moves, and its brick: one that may be it is first."""
     best, far = 0.0, first
-    for after in range(-1, len(moved) // 6):
+    for after in range(-1, part.bricks):
         brick = first if after < 0 else after
         shift = turn = 0.0
         for p in range(6 * brick, 6 * brick + 3):
@@ -306,25 +305,31 @@ def _farthest(moved: Floats, motion: Motion, nodes: int, first: int) -> tuple[fl
         if (shift + turn + 2 * np.sqrt(shift * turn)) * _ROUNDED <= best:
             continue
         for k in range(motion.first[brick], motion.first[brick + 1]):
-            if motion.node[k] < nodes:
-                square = _square(moved, motion, motion.node[k])
+            if motion.node[k] < part.nodes:
+                square = _square(moved, motion, part.bricks, motion.node[k])
                 if square > best:
                     best, far = square, brick
     return best, far
 
 
 @_compiled("nnan", "nsz")
-def _most_moment(carried: Floats, ends: Ends) -> float:
+def _most_moment(carried: Floats, pull: Floats, grown: Grown, ends: Ends, at: Ints) -> float:
     """Return the square of the largest moment at any ground end that acts."""
-    most = 0.0
+    most, wrench = 0.0, np.empty(6)
     for g in range(len(ends.first)):
         first, square = ends.first[g], 0.0
         if first >= len(carried):
             continue
+        for p in range(3):
+            wrench[p], wrench[3 + p] = carried[first + p], grown.wrench[0, 1, first + p]
+            for i in range(len(at)):
+                for q in range(6):
+                    row = 1 + 6 * (at[i] // 2) + q
+                    wrench[3 + p] += pull[i, q] * grown.wrench[row, 1, first + p]
         for c in range(3):
             total = 0.0
             for p in range(6):
-                total += carried[first + p] * ends.moment[g, p, c]
+                total += wrench[p] * ends.moment[g, p, c]
             square += total * total
         most = max(most, square)
     return most
@@ -340,12 +345,14 @@ def reduce_sets(
     """
     edges, motion, ends = maps
     found, tension = np.zeros((4, len(columns))), np.empty(part.bricks)
-    carried, moved, far = np.empty(part.wrenches), np.empty(6 * part.bricks), 0
+    carried, moved, far = np.zeros(grown.wrench.shape[2]), np.zeros(grown.twist.shape[2]), 0
+    pull = np.empty((columns.shape[1], 6))
     for s in range(len(columns)):
-        _sum_rows(moved, carried, grown, columns[s], force[s])
+        there = moved[: 6 * part.bricks], carried[: part.forces]  # the rest stays zero
+        _sum_rows(*there, pull, grown, columns[s], force[s])
         if part.nodes:
-            found[2, s], far = _farthest(moved, motion, part.nodes, far)
-        found[3, s] = _most_moment(carried, ends)
+            found[2, s], far = _farthest(moved, motion, part, far)
+        found[3, s] = _most_moment(there[1], pull, grown, ends, columns[s])
         least, most = _extremes_outside(carried, edges, part)
         _pull_bricks(tension, carried, edges, part, columns[s], force[s])
         for b in range(part.bricks):

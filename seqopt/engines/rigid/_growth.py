@@ -86,15 +86,14 @@ class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
     Row 0 is the weight of the bricks that stand with all else that loads and moves them, row
-    ``1 + 6b + i`` a unit of component ``i`` on brick b at its centroid. Of the arrays, which
-    have room for all bricks of the tree, the rows and columns of bricks and springs that are there
-    count.
+    ``1 + 6b + i`` a unit of component ``i`` on brick b at its centroid. The arrays have room for
+    all bricks of the tree.
 
     ``tree``: on which the bricks hang. ``twist`` (1 + 6B, 6B): of the bricks, m and rad; ``wrench``
-    (1 + 6B, 6S): of every spring on its second body, N and N m; ``loss`` (B,): how much more than
-    the last digit of a brick's motions is rounding, as what moved it further before is gone;
-    ``remembers``: whether `answers` takes the last brick count but one from the last, which differs
-    in rounding.
+    (1 + 6B, 2, 3S): forces, N, then moments, N m, of every spring on its second body; ``loss``
+    (B,): how much more than the last digit of a brick's motions is rounding, as what moved it
+    further before is gone; ``remembers``: whether `answers` takes the last brick count but one from
+    the last, which differs in rounding.
     """
 
     remembers = False
@@ -119,7 +118,7 @@ class Growth:
         self._along = _carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        self.wrench = np.zeros((1 + most, 6 * self._acting[-1]))
+        self.wrench = np.zeros((1 + most, 2, 3 * self._acting[-1]))
         self._before: _Before | None = None
         self._start()
 
@@ -132,7 +131,7 @@ class Growth:
             weighed = [each.copy() for each in self._answers(0)]
             loss = self.loss[: self.bricks].copy()
             self._add()
-            closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 2
+            closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 3
             mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
             others = mine[mine != self._tree.spring[self.bricks - 1]]
             if others.size:
@@ -151,24 +150,23 @@ class Growth:
         if len(held) < bricks:
             every = 1 + 6 * held[:, None] + np.arange(6)
             rows = np.concatenate([[0], every.ravel()])
-        twist, wrench = self._answers(rows)
-        if bricks == self.bricks or self._before is None:
-            return twist, wrench, self.loss[held]
-        weighed, loss, closing, changes = self._before
-        found = []
-        for now, change, row in zip((twist, wrench), changes, weighed, strict=True):
-            found.append((now - closing[rows] @ change)[:, : len(row)])
-            found[-1][0] = row
-        return found[0], found[1], loss[held]
+        found, loss = [*self._answers(rows)], self.loss
+        if bricks < self.bricks and self._before is not None:
+            weighed, loss, closing, changes = self._before
+            for i, (change, row) in enumerate(zip(changes, weighed, strict=True)):
+                found[i] = (found[i] - closing[rows] @ change)[:, : len(row)]
+                found[i][0] = row
+        wrench = [part.reshape(len(part), -1, 1, 3) for part in found[1:]]
+        return found[0], np.concatenate(wrench, axis=2).reshape(len(found[0]), -1), loss[held]
 
     @property
     def _moves(self) -> int:
         return 6 * self.bricks
 
-    def _answers(self, rows: slice | Ints | int) -> tuple[Floats, Floats]:
-        """Return the twists of bricks that stand, and the wrenches of springs that act."""
-        acting = 6 * self._acting[self.bricks]
-        return self.twist[:, : self._moves][rows], self.wrench[:, :acting][rows]
+    def _answers(self, rows: slice | Ints | int) -> tuple[Floats, Floats, Floats]:
+        """Return twists of bricks that stand, and forces and moments of springs that act."""
+        force, moment = self.wrench[:, :, : 3 * self._acting[self.bricks]].swapaxes(0, 1)
+        return self.twist[:, : self._moves][rows], force[rows], moment[rows]
 
     def _start(self) -> None:
         self.bricks, self._left = 0, 1.0  # rounding when the twists were summed anew
@@ -183,8 +181,8 @@ class Growth:
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
-        self.wrench[0, k * self._acting[brick] : k * self._acting[self.bricks]] = 0.0
-        acting = slice(k * self._acting[self.bricks])  # of old rows as of new springs: zeros
+        self.wrench[0, :, 3 * self._acting[brick] : 3 * self._acting[self.bricks]] = 0.0
+        acting = slice(3 * self._acting[self.bricks])  # of old rows as of new springs: zeros
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:
@@ -192,17 +190,17 @@ class Growth:
             theirs = slice(1 + moved.start, 1 + moved.stop)
             self.twist[rows, : k * brick] = along @ self.twist[theirs, : k * brick]
             self.twist[old, mine] = self.twist[old, moved] @ along.T
-            self.wrench[rows, acting] = along @ self.wrench[theirs, acting]
+            self.wrench[rows, :, acting] = np.tensordot(along, self.wrench[theirs, :, acting], 1)
             flexibility = flexibility + along @ self.twist[theirs, moved] @ along.T
             self.loss[brick] = self.loss[parent]
         else:
             self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
-            self.wrench[rows, acting] = 0.0
+            self.wrench[rows, :, acting] = 0.0
             self.loss[brick] = 1.0
             if self._shift[spring].any():
                 self.twist[0, mine] = own @ self._shift[spring]
         self.twist[rows, mine] = flexibility
-        self.wrench[rows, self._of(spring)] = -own
+        self.wrench[rows, :, self._of(spring)] = -own.reshape(k, 2, 3)
         pulls = [(brick, self._network.weight[brick])]  # and loads that begin with it
         begun = self._network.applied(brick + 1, before=brick)
         pulls += [(body, begun[body]) for body in np.flatnonzero(begun.any(axis=1)).tolist()]
@@ -213,24 +211,25 @@ class Growth:
         self._tie(np.array([spring]), self._ties)
 
     def _of(self, spring: int) -> slice:
-        """Return the columns of a spring's wrenches."""
-        return slice(6 * spring, 6 * spring + 6)
+        """Return the columns of a spring's forces, and of its moments."""
+        return slice(3 * spring, 3 * spring + 3)
 
     def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
         """Let springs act that close loops; return the changes, as `_Before` has them."""
         k, rows = 6, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
         answers = self._answers(rows)
-        pulled = np.concatenate([self._pulled(answers[1], s) for s in springs])
+        pulled = [np.concatenate([self._pulled(e, s) for s in springs]) for e in answers[1:]]
         own = linalg.block_diag(*self._compliance[springs])
         system = own + np.concatenate([self._pulled(gaps, s) for s in springs])
         factors = linalg.lu_factor(0.5 * (system + system.T))
         closing = -linalg.lu_solve(factors, gaps.T).T
         closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
-        changes, before = [np.ascontiguousarray(gaps[1:].T), pulled], self._own().copy()
+        changes, before = [np.ascontiguousarray(gaps[1:].T), *pulled], self._own().copy()
         _add_products(answers, closing, changes)
         for i, spring in enumerate(springs.tolist()):
-            self.wrench[rows, self._of(spring)] = closing[:, k * i : k * i + k]
+            mine = closing[:, k * i : k * i + k].reshape(-1, 2, 3)
+            self.wrench[rows, :, self._of(spring)] = mine
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
@@ -257,7 +256,7 @@ class Growth:
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
             for brick, parent, spring, given, along in ways:
-                twist[:, brick] = self.wrench[part, self._of(spring)] @ given
+                twist[:, brick] = self.wrench[part, :, self._of(spring)].reshape(-1, k) @ given
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
                 elif start == 0:
@@ -283,7 +282,7 @@ class Growth:
             body, s, sign = trail[body]
             carried = _carried(at - springs.position[s])
             turn = self._compliance[s] @ carried.T
-            out -= self.wrench[: len(out), self._of(s)] @ (sign * turn)
+            out -= self.wrench[: len(out), :, self._of(s)].reshape(-1, 6) @ (sign * turn)
             out[0] += sign * carried @ self._shift[s]
         out[0] -= self._shift[spring]
         return out
