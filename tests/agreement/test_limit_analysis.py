@@ -126,9 +126,8 @@ def test_margins_are_the_certificates(arch25, bricks, sets):
     network = build_network(arch25)
     held = some_sets(arch25, bricks, sets)
     margins = Margins(network, DRY)
-    bond, grip, friction = (
-        of(bricks, held) for of in (margins.bond, margins.grip, margins.friction)
-    )
+    bond, grip = margins.bond(bricks, held), margins.grip(bricks, held)
+    friction = margins.friction(bricks, held)
     nodes = [n for brick in arch25.placed for n in brick.nodes]
     for i, row in enumerate(held.tolist()):
         grips = [nodes[place - 1] if place else None for place in row]
