@@ -28,7 +28,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
-from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import RIGID, Fields, GripCompliance, _join_sets, _merge_sets, no_sets
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
@@ -174,7 +174,6 @@ class Refinement:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks)
         self.held = _HeldSystem(self.parts, tied=tied)
-        self._corrector: _Corrector | None = None  # of the operator that was asked last
         size = 6 * bricks
         self.inner = self.parts.inner  # loads on scaled twists, (l, 6b), as of `load_rows`
         if network.scene.grip_kinds.turns.any():
@@ -224,9 +223,7 @@ class Refinement:
         correction of a set after which it needs no other, over the largest of each kind.
         """
         operator = self.own if operator is None or self.held.loose else operator
-        corrector = self._corrector
-        if corrector is None or (corrector.operator, corrector.largest) != (operator, largest):
-            self._corrector = corrector = _Corrector(self, operator, largest)
+        corrector = _Corrector(self, operator, largest)
         parts = [no_sets(self.network, self.bricks, columns.shape[1])]
         for start in range(0, len(columns), _TOGETHER):
             part = slice(start, start + _TOGETHER)
@@ -241,13 +238,6 @@ class _Corrector:
     system: Refinement
     operator: ComplianceOperator
     largest: float = LAST_CORRECTION
-
-    @cached_property
-    def rows(self) -> Floats:
-        """The scaled answers (l + 1, n) to single loads and the weight."""
-        operator, parts = self.operator, self.system.parts
-        wrench = operator.wrench.reshape(len(operator.wrench), -1, 6)
-        return frozen(rescaled(parts, wrench, operator.twist))
 
     def together(self, columns: Ints, compliance: GripCompliance = RIGID) -> Fields:
         """Return the fields of a few sets."""
@@ -274,7 +264,9 @@ class _Corrector:
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
-        return np.asarray(self.operator.loads(index, force, weight) @ self.rows)
+        operator, loads = self.operator, self.operator.loads(index, force, weight)
+        wrench = (loads @ operator.wrench).reshape(len(index), -1, 6)
+        return rescaled(self.system.parts, wrench, loads @ operator.twist)
 
     def _correct(
         self, columns: Ints, index: Ints, compliance: GripCompliance, states: Floats, force: Floats
