@@ -41,6 +41,7 @@ from seqopt.work import Progress, Tell, _one_thread, map_ordered, worker_pool
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
+SHARED = 3e5  # work at once from which on processes are sooner together
 COMPILED = 1e6  # work from which on compiled loops save more than loading them takes
 # Engines of the last two runs of each thread of a worker: executors of users have no storage for
 # workers' data between tasks, each of which would build its engine again.
@@ -177,7 +178,8 @@ def answer(engine: Engine, block: Block) -> Floats:
 def packed(engine: Engine) -> bytes:
     """Pickle an engine's recipe, or itself if it has none; a `SceneError` if it cannot be."""
     recipe = recipe_of(engine)
-    known = recipe is not None and recipe.network == engine.network  # else it makes another engine
+    own = None if recipe is None else recipe.network
+    known = own is engine.network or own == engine.network  # else it makes another engine
     try:
         return pickle.dumps(recipe if known else engine)
     except Exception as error:  # foreign code may raise any error
@@ -308,11 +310,13 @@ def solve_sets(engine: Engine, sets: Block, resources: Resources = HERE) -> Floa
 
     Infinite of mechanisms. Raises `SolverError`, `WorkerError`.
     """
-    grips, alone = sets.grips, resources.executor is None and resources.workers == 1
+    grips, load = sets.grips, work(len(sets.grips), sets.bricks)
+    alone = resources.executor is None and resources.workers == 1
+    alone |= load < SHARED and isinstance(engine, ComplianceEngine)  # others take far longer
     most = BLOCK if alone else min(BLOCK, max(64, len(grips) // 32))  # sets of a task
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
-    own = resources if len(parts) > 1 else HERE  # to share one part does not pay
-    progress = Progress("responses", work(len(grips), sets.bricks), own.progress)
+    own = HERE if alone or len(parts) < 2 else resources  # to share little does not pay
+    progress = Progress("responses", load, resources.progress)
 
     def done(part: Block, found: tuple[Floats, int]) -> None:
         progress.add(work(len(part.grips), part.bricks))

@@ -192,9 +192,9 @@ def worker_pool(executor: Executor | None = None, workers: int = 1) -> Iterator[
     """
     if workers < 1:
         raise WorkerError(f"workers is {workers}; give a whole number from 1")
-    kept = _KEPT.get()
-    if kept is not None or (executor is None and workers == 1):
-        yield kept
+    alone, kept = executor is None and workers == 1, _KEPT.get()
+    if alone or kept is not None:
+        yield None if alone else kept
         return
     if executor is not None:
         known = getattr(executor, "_max_workers", None)

@@ -91,7 +91,7 @@ def blocks_of(schedule, most):
     ("name", "workers"), [pytest.param("compliance", 2, marks=pytest.mark.long), ("auto", 3)]
 )
 def test_results_are_the_same_whatever_the_workers(monkeypatch, loop25, name, workers):
-    """And whether all sets are one block or, on this small scene, many."""
+    """And whether all sets are one block or, on this small scene, many that are shared."""
     found = []
     for size, own in ((10**9, 1), (50, workers)):
         monkeypatch.setattr(batches, "BLOCK", size)

@@ -43,13 +43,6 @@ def test_less_friction_than_the_paper_has_is_seen():
     assert faults(pd.DataFrame([row(one._replace(ours=push(wall(1), 0.64)), FEW)]))
 
 
-def test_the_walls_have_the_blocks_and_joints_of_the_paper():
-    """Variables of frictionalblock_1 to _6 in MPECLIB: 3 a block, 7 a joint, and 2."""
-    walls = [wall(k) for k in range(1, 7)]
-    sizes = [2 + 3 * len(one.vertex) + 7 * len(one.contacts) for one in walls]
-    assert sizes == [682, 1154, 854, 979, 1025, 2855]
-
-
 @pytest.mark.parametrize("degrees", [5.0, 20.0, 35.0])
 def test_a_block_slides_at_the_friction_angle(degrees):
     result = assess(inclined(radians(degrees)), DRY)
