@@ -178,12 +178,11 @@ def test_linear_programs_know_the_lever():
 def test_wind_keeps_its_force_where_a_block_is_tilted(wind):
     """It tips where cos t = 5/3 (sin t + wind); a pull by tan t would count wind as less."""
     scene = replace(block((0.3, 0.5, 0.5)), wind=(wind, 0.0, 0.0))
-    network = build_network(scene)
     tips = acos(0.5 * wind / sqrt(0.3**2 + 0.5**2)) - atan(0.5 / 0.3)
-    tilt = assess(step_assembly(network, 1, (None,) * len(scene.robots)), ROUGH).tilt
+    tilt = assess(step_assembly(build_network(scene), 1, (None,) * len(scene.robots)), ROUGH).tilt
     assert (1 - NEAR) * tips <= tilt <= tips * (1 + 1e-4)
     assert tan(tips) + wind < 0.6 * (1 - NEAR) or not wind  # the control
-    stands = [Screen(network, ROUGH, share * tips).stands(1, [[0]])[0] for share in (0.997, 1.001)]
+    stands = [Screen(scene, ROUGH, share * tips).stands(1, [[0]])[0] for share in (0.997, 1.001)]
     assert stands == [STANDS, FALLS]
 
 
