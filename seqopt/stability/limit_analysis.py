@@ -40,6 +40,7 @@ DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
 _ROUNDED = 1e-9  # share of half a turn that is rounding
 _MORE = 8  # directions at most that are added where the bound for all others is least
+_TRIED = 8  # pulls at most, until one is near the largest that is survived beside loads
 NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
 
@@ -315,9 +316,9 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
 
 
 def turned(fixed: Case, pull: float) -> Case:
-    """Return a case in which gravity is turned by as much as a pull turns it, over its share left.
+    """Return the loads of a turn by atan(pull), over the share of gravity that is left upright.
 
-    What else loads an assembly does not turn: it counts as much more as less of gravity is left.
+    Loads beside gravity do not turn: they count as much more as that share is less.
     """
     return replace(fixed, applied=(float(np.hypot(1.0, pull)), 0.0))
 
@@ -328,10 +329,10 @@ def safe_turn(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     Its value is sought between those that are survived so and those that are not.
     """
     pulls, worst = safe_pull(prove, fixed, up)
-    if not len(prove.assembly.applied):
+    if np.isnan(worst) or not len(prove.assembly.applied):
         return pulls, worst
     safe, value = 0.0, worst
-    for _ in range(_MORE):
+    for _ in range(_TRIED):
         _, again = safe_pull(prove, turned(fixed, value), up)
         safe = value if again >= value else safe
         if value <= again <= (1 + GAP) * value:
