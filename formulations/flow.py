@@ -140,13 +140,6 @@ def within_caps(flow: Flow, arcs: cp.Variable) -> list[cp.Constraint]:
     return [cp.NonNeg(tied(cap) - taken @ arcs) for cap, taken in pairs]
 
 
-def above_states(flow: Flow, arcs: cp.Variable, largest: cp.Variable) -> cp.Constraint:
-    """Let the largest cost be no less than that of the moves which enter a state."""
-    entries = flow.cost, (flow.graph.target, np.arange(len(flow.cost)))
-    entered = sparse.csr_array(entries, shape=(flow.graph.states, len(flow.cost)))
-    return cp.NonNeg(largest - entered @ arcs)
-
-
 class _Least(NamedTuple):
     """The least of one goal by linear programs.
 
@@ -301,8 +294,10 @@ def _whole(graph: Graph) -> WholeProgram:
     rules = [conserved(flow, arcs), *within_caps(flow, arcs)]
     least = flow.cost @ arcs
     if graph.peaks[0]:
-        least = largest
-        rules.append(above_states(flow, arcs, largest))
+        least = largest  # no less than the cost of the moves which enter any state
+        entries = flow.cost, (flow.graph.target, np.arange(len(flow.cost)))
+        entered = sparse.csr_array(entries, shape=(flow.graph.states, len(flow.cost)))
+        rules.append(cp.NonNeg(largest - entered @ arcs))
     return WholeProgram(cp.Problem(cp.Minimize(least), rules), arcs, flow.path, flow.bound)
 
 

@@ -126,6 +126,8 @@ WRONG = {
     "'free' is no schedule; take one of": lambda: PROBLEM.but(moves="free"),
     "'weighted' is no criterion; take": lambda: PROBLEM.but(criterion="weighted"),
     "'frame' is no engine; take one of": lambda: PROBLEM.but(engine="frame"),
+    "3 is no Resources; take one of": lambda: PROBLEM.but(resources=3),
+    "limit D_max=20: 20 m is more": lambda: PROBLEM.but(limits=[seqopt.Limit("D_max", 20.0)]),
     "scenarios 3: give seqopt.scenarios": lambda: PROBLEM.but(scenarios=3),
     "scenario 1: 3 is not a scene": lambda: PROBLEM.but(scenarios=[3]),
     "time_limit is '5s'; give seconds from 0": lambda: seqopt.solve(PROBLEM, time_limit="5s"),

@@ -326,7 +326,7 @@ class States(Shown):
         """How many grip sets were solved."""
         if self.each:
             return sum(problem.models for problem in self.each)
-        again = self.sets.solved if self._by_ranks else 0  # all were solved with six digits before
+        again = self.screened.solved_by(self.sets) if self._by_ranks else 0
         return self.sets.solved + self.six_digit_models - again
 
     @property
@@ -417,8 +417,9 @@ class States(Shown):
 
     @cached_property
     def _by_ranks(self) -> bool:
-        """Whether ranks among candidates are all that is asked of states."""
-        return self._by_candidates and isinstance(self.criterion, RankSum)
+        """Whether ranks among candidates, and limits, are all that is asked of states."""
+        goals = all(goal.of_criterion for goal in self.goals)
+        return goals and isinstance(self.criterion, RankSum) and not self.filters
 
     def _by_name(
         self, level: int, states: Ints, answers: Floats, forces: Floats
@@ -434,9 +435,9 @@ class States(Shown):
         self, bricks: int, found: Mapping[str, Floats], forces: Floats, most: Floats
     ) -> Bools:
         """Return which states single precision may round or limit otherwise, (n,)."""
-        if isinstance(self.criterion, RankSum):
-            return self.criterion.is_close(found, bricks, BAND)
         close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
+        if isinstance(self.criterion, RankSum):
+            close |= self.criterion.is_close(found, bricks, BAND)
         for limit in self.limits:
             if limit.response in found:
                 close |= _near(found[limit.response], limit.counted)

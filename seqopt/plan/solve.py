@@ -254,6 +254,8 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
         def solved(one: Problem) -> Plan:
             with run.clock.needed("posing the problem"):
                 graph = graph_of(one, found.aim)
+            if not own:
+                graph = replace(graph, answers=graph_of(problem, found.aim).answers)
             return _chosen(graph, found, how)
 
         plan = solved(asked)

@@ -356,7 +356,8 @@ class Problem(Shown):
         """
         given = {name: value for name, value in locals().items() if value is not ...}
         del given["self"]
-        parts = [given.get(name, getattr(self, name)) for name in ("engine", "moves", "criterion")]
+        names = "engine", "moves", "criterion", "resources"
+        parts = [given.get(name, getattr(self, name)) for name in names]
         require_parts(*parts)
         if "limits" in given:
             found = parse_limits(given["limits"], parts[0].network.scene)

@@ -40,6 +40,7 @@ from seqopt.errors import ProblemError, did_you_mean, message_of
 from seqopt.network.network import Network
 from seqopt.problem.amounts import BUILT_IN, Amount, StateArrays, call, require_named
 from seqopt.problem.criteria import Criterion
+from seqopt.responses._grip_sets import Resources
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
@@ -192,12 +193,15 @@ def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
     return (Limit(PROP_EXCESS, _LITTLE * (weight / len(scene.bricks) or 1.0)),)
 
 
-def require_parts(engine: Engine, moves: Schedule | FreeRules, criterion: Criterion) -> None:
+def require_parts(
+    engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, resources: Resources
+) -> None:
     """Raise a `ProblemError` if a part of a problem is none."""
     wanted = (
         (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
         (moves, isinstance(moves, Schedule | FreeRules), "schedule", "three_robot_loop"),
         (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
+        (resources, isinstance(resources, Resources), "Resources", "responses.Resources"),
     )
     for given, right, what, source in wanted:
         if not right:
@@ -617,9 +621,7 @@ def parse_limits(
     ``20um``, ``linear_range=SHARE``, or ``any`` to lift it, and names of what was registered.
     ``where``: for messages.
     """
-    several = (given,) if isinstance(given, str | Asked) else given
-    if not isinstance(several, Sequence):
-        return as_limits(several)
+    several = given if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
     out: list[Asked] = []
     for each in several:
         if isinstance(each, Filter | Resource):
@@ -631,14 +633,16 @@ def parse_limits(
         elif "=" not in each and each in (own := registered(Filter) | registered(Resource)):
             out.append(own[each])
         else:
-            out.append(limit := _limit_of(each, where))
-            size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
-            size += max(max(brick.dimensions) for brick in scene.bricks)
-            if limit.response[0] == "D" and limit.bound > size:
-                raise ProblemError(
-                    f"{where} {each}: {limit.bound:g} m is more than the structure's size, "
-                    f"{length_text(float(size))}; give a length in m, or as 20um or 0.02mm"
-                )
+            out.append(_limit_of(each, where))
+    size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
+    size += max(max(brick.dimensions) for brick in scene.bricks)
+    for limit in out:
+        if isinstance(limit, Limit) and limit.response[0] == "D" and size < limit.bound < math.inf:
+            raise ProblemError(
+                f"{where} {limit.response}={limit.bound:g}: {limit.bound:g} m is more than the "
+                f"structure's size, {length_text(float(size))}; give a length in m, or in words as "
+                "20um or 0.02mm"
+            )
     return tuple(out)
 
 

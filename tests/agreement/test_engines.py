@@ -216,16 +216,13 @@ def moved_nodes(scene, *offsets):
     return build_network(replace(scene, bricks=tuple(bricks)))
 
 
-def turned(brick, *shares):
-    """Points on a brick's long axis, shares of its length from its centroid."""
-    return [tuple(s * brick.dimensions[0] * x for x in brick.length_axis) for s in shares]
-
-
 @pytest.mark.parametrize("shares", [(-0.1, 0.4), (0.05, 0.3)])
 def test_weights_act_at_centroids_wherever_nodes_are(shares):
     """Nodes on the long axis but not on either side: exact bricks and frame find the same."""
     scene = six_bricks("V")
-    network = moved_nodes(scene, *turned(scene.bricks[1], *shares))
+    brick = scene.bricks[1]
+    along = np.multiply(brick.dimensions[0], brick.length_axis)
+    network = moved_nodes(scene, *(tuple(share * along) for share in shares))
     one, other = (numbers(engine, network) for engine in ("compliance", "frame"))
     assert one == pytest.approx(other, rel=1e-6, abs=1e-6 * np.nanmax(np.abs(one)), nan_ok=True)
     free = make_engine("compliance", network).solve(4, np.zeros((1, 0), int))

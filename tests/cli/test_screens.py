@@ -31,18 +31,6 @@ def printed(capsys, monkeypatch):
     return run
 
 
-def defined(text):
-    """The words that begin a line of a list of options, and whatever stands in its place."""
-    begins = (line[2:] for line in text.splitlines() if line[:2] == "  " and line[2:3] > " ")
-    return [line.split()[0].rstrip(",") for line in begins]
-
-
-def flags(command):
-    """The options and arguments of a command, as help lists them."""
-    named = (action.option_strings or [action.metavar] for action in command._actions)
-    return [names[0] for names in named if names[0] is not None]
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_has_every_option_once_and_examples_on_lines_of_their_own(printed, name):
     out = printed(name, "--help")
@@ -51,9 +39,12 @@ def test_help_has_every_option_once_and_examples_on_lines_of_their_own(printed, 
     about = "\n".join(group.description or "" for group in command._action_groups)
     said = {line.strip() for line in about.splitlines()}
     kept = [line for line in out.splitlines() if line.strip() not in said]
-    body = defined("\n".join(kept).partition("\nexample")[0])
-    for flag in flags(command):
-        assert body.count(flag) == 1, flag
+    lines = "\n".join(kept).partition("\nexample")[0].splitlines()
+    begun = (line[2:].split()[0] for line in lines if line[:2] == "  " and line[2:3] > " ")
+    body = [word.rstrip(",") for word in begun]
+    for action in command._actions:
+        flag = (action.option_strings or [action.metavar])[0]
+        assert flag is None or body.count(flag) == 1, flag
     examples = signature_of(COMMANDS[name].load()).examples
     assert [example for example in examples if f"\n  {example}\n" not in out] == []
 

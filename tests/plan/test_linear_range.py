@@ -87,11 +87,15 @@ def test_the_best_plan_keeps_the_range_wherever_one_does(words, formulation):
     problem = posed(between(words, formulation), **words)
     free, far = moved(problem, formulation)
     assert far > 1
-    plan = seqopt.solve(problem, formulation)
+    before, plan = problem.engine.answered, seqopt.solve(problem, formulation)
+    both, hard = problem.engine.answered - before, problem.but(limits=[HARD])
     assert plan.moved.share <= 1 + 1e-9
     assert not plan.is_far
     assert not plan.beyond
-    assert plan.status == seqopt.solve(problem.but(limits=[HARD]), formulation).status
+    assert plan.status == seqopt.solve(hard, formulation).status
+    seqopt.solve(problem.but(limits=[LIFTED]), formulation)
+    apart = problem.engine.answered - before - both  # zero where scenes of their own are solved
+    assert both < apart or not apart, "the second search began anew"
     limit = Limit("D_max", linear_limit(problem.scene))
     same = seqopt.solve(problem.but(limits=[limit]), formulation)
     assert plan.certificate.values == pytest.approx(same.certificate.values)
