@@ -22,7 +22,7 @@ from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._frontal import FrontalFactor, FrontalSystem
-from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._growth import Growth, grow_tree
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
     add_products,
@@ -552,6 +552,19 @@ def test_memory_grows_as_the_square_of_the_bricks(make):
 def test_an_operator_per_brick_count_would_be_seen():
     """Negative control: keeping all of them grows as the cube."""
     assert kept_bytes(half_circle(64), most=np.inf) > PER_PAIR * 64**2 + 2e5
+
+
+def test_a_search_asks_brick_by_brick(monkeypatch):
+    """Nothing grows anew but the first two bricks: their steps leave no grip open."""
+    added, add = [], Growth._add
+    monkeypatch.setattr(Growth, "_add", lambda growth: added.append(add(growth)))
+    engine = ComplianceEngine(seqopt.load_scene("arch25"))
+    loop = seqopt.three_robot_loop(engine.network)
+    problem = seqopt.pose(engine, loop, seqopt.CRITERIA["equations-2-3"])
+    seqopt.solve(problem, "cascade", proof=False)
+    assert len(added) <= 25 + 2
+    engine._builder.growth.reach(25)  # from what was asked last
+    assert len(added) > 25 + 2, "what begins anew is seen"
 
 
 def test_the_last_brick_count_but_one_is_recalled():

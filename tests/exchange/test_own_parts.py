@@ -78,16 +78,12 @@ def test_names_that_are_taken_are_refused_by_kind():
 ENDS = {"obj": "obj"}
 
 
-def first_step(scene):
-    """A plan of one step that every scene has: a robot that need not reach it places a brick."""
-    grips = (scene.placed[0].placing_node, *[None] * (len(scene.robots) - 1))
-    return (Step(1, StepKind.PLACE, 1, grips),)
-
-
 def written(scene, form, folder):
-    """A scene as a file of a format."""
+    """A scene as a file of a format, with a step: a robot that need not reach it places a brick."""
     path = folder / f"scene.{ENDS[form]}"
-    path.write_text(export(scene, first_step(scene), form), encoding="utf-8")
+    grips = (scene.placed[0].placing_node, *[None] * (len(scene.robots) - 1))
+    steps = (Step(1, StepKind.PLACE, 1, grips),)
+    path.write_text(export(scene, steps, form), encoding="utf-8")
     return path
 
 

@@ -343,16 +343,12 @@ def steps_at(graph, level, states):
     return [Step(step.number, step.kind, step.bricks, row) for row in rows]
 
 
-def open_levels(graph):
-    return [level for level in range(1, graph.space.levels + 1) if graph.space.open_columns(level)]
-
-
 @pytest.mark.parametrize("method", ["three-robot", "modified-sequential"])
 def test_states_hold_the_responses_of_their_steps(engine25, method):
     """Of a random candidate of every open step: as if that step were analyzed alone."""
     graph = graph_of(pose(engine25, SCHEDULES[method](engine25.network), EQUATIONS, limits=BEYOND))
     rng, robots = np.random.default_rng(1), engine25.network.scene.robots
-    for level in open_levels(graph):
+    for level in filter(graph.space.open_columns, range(1, graph.space.levels + 1)):
         every = graph.space.candidates(level).states
         at = int(rng.integers(len(every)))
         found = {name: v[at] for name, v in graph.seen(level, every).responses.items()}
