@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,12 +14,19 @@ import pandas as pd
 
 from seqopt.arms._kept import arm_faults
 from seqopt.arrays import Terse
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
-from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
-from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
+from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError, TimeUpError
+from seqopt.graph.formulation import (
+    Formulation,
+    FormulationKind,
+    Run,
+    find_formulation,
+    formulations,
+)
 from seqopt.plan.plan import Plan
-from seqopt.plan.solve import graph_of, on_the_way, pose, solve
+from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import _prop_faults, overloads
@@ -50,7 +59,7 @@ from seqopt.study import (
     printed_maxima,
     published_plan,
 )
-from seqopt.work import Stage, Tell
+from seqopt.work import Clock, Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
 MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
@@ -115,6 +124,7 @@ def compare(
     prover: BuildProver | None = None,
     speed: float = 0.0,
     reference: str = "",
+    mortar: Mortar | None = None,
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
@@ -127,9 +137,12 @@ def compare(
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
     speed : float, optional
-        Seconds for all ways to a plan together, to set their speed against what their plans cost.
+        Seconds in all: to set the speed of every way to a plan against what its plan costs, after
+        a quarter at most for loops, and for the free schedule, that are shown.
     reference : str, optional
         The engine that values these plans; by default the most detailed one with data.
+    mortar : Mortar, optional
+        With which every step of these plans has to stand.
 
     Returns
     -------
@@ -156,20 +169,18 @@ def compare(
     printed = printed_maxima().set_axis(maxima.index) if in_paper else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
     fixed = [largest(scene, table) for table in tables.values()]
-    plans, problem, refusal = _plans(engine, criterion, progress, robots)
+    whole, part = Clock(speed or math.inf), speed / 4 or math.inf
+    plans, problem, refusal, late = _plans(engine, criterion, progress, robots, Clock(part))
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     if problem is not None and PUBLISHED in rows and not robots:
         rows[PUBLISHED] |= _published_row(problem, plans.values())
-    free, why = _free_plan(engine, criterion, fixed, robots, progress)
+    free, why = _free_plan(
+        engine, criterion, fixed, robots, Run(PATIENCE, progress, clock=Clock(part))
+    )
     if not tables and free is None:  # the first refusal says most
         raise type(refused[0])(f"{refused[0]}; {why[0]}")
-    measured = None
-    if speed:
-        how: dict[str, Any] = {"seconds": speed, "reference": reference, "progress": progress}
-        how |= {} if free is None else {"rules": free.states.rules}
-        measured = measure_regret(asked, criterion, **how)
-    notes += why
+    notes += why + late
     criteria: dict[str, Criterion] = {}
     if problem is not None:
         loop_name = problem.method
@@ -186,6 +197,12 @@ def compare(
     notes += [f"In the paper: {text}" for text in IRREGULARITIES] if in_paper else []
     found = (maxima, printed, table, tables, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
+    measured = None
+    if speed:
+        how: dict[str, Any] = {"reference": reference, "mortar": mortar, "progress": progress}
+        how |= {"seconds": max(whole.left, speed / 2)}
+        how |= {} if free is None else {"rules": free.states.rules}
+        measured = measure_regret(asked, criterion, **how)
     return Comparison(*found, criteria, verdicts, enough, measured)
 
 
@@ -216,18 +233,25 @@ def _table(
 
 
 def _plans(
-    engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
-) -> tuple[dict[str, Plan], Problem | None, str]:
-    """Return the plans of all formulations and the problem of the loop, or why there is none."""
+    engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str], clock: Clock
+) -> tuple[dict[str, Plan], Problem | None, str, list[str]]:
+    """Return the plans of all formulations and the problem of the loop, or why there is none.
+
+    Last a note of those that the clock ended.
+    """
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
-    plans: dict[str, Plan] = {}
+    plans, late = dict[str, Plan](), list[str]()
 
     def solved(schedule: Schedule, named: Mapping[str, Formulation]) -> Problem:
         problem = pose(engine, schedule, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(named.items()):
             progress(Stage("comparing", (done + 1) / (len(named) + 1)))
-            plans[name] = on_the_way(solve(problem, formulation))
+            late.append(name)
+            with suppress(TimeUpError):
+                plan = on_the_way(_solve_run(problem, formulation, Run(clock=clock)))
+                if plan.certificate is not None:
+                    plans[late.pop()] = plan
         return problem
 
     try:
@@ -235,9 +259,10 @@ def _plans(
         if count >= MOST:
             cascade = {"modified-sequential": find_formulation("cascade")}
             solved(modified_sequential(network, robots[:3]), cascade)
-        return plans, solved(loop, formulations("costs")), ""
+        problem = solved(loop, formulations("costs"))
     except (StepError, ProblemError) as error:
-        return {}, None, str(error)
+        return {}, None, str(error), []
+    return plans, problem, "", [f"left out, for lack of time: {', '.join(late)}"] * bool(late)
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -257,7 +282,8 @@ def _published_row(problem: Problem, plans: Iterable[Plan]) -> dict[str, object]
     loop = graph_of(problem, Aim.SUM)
     (value,) = plan_values(loop, published_plan(problem.scene))
     alike = (p for p in plans if (p.method, p.goals) == (loop.method, loop.names))
-    bound = max(p.certificate.bound for p in alike if p.certificate is not None)
+    bounds = (p.certificate.bound for p in alike if p.certificate is not None)
+    bound = max(bounds, default=np.nan)  # nothing is proven for lack of time
     gap = (value - bound) / (abs(value) or 1.0)
     return {"problem": problem.method, "objective": value, "gap": gap}
 
@@ -327,7 +353,7 @@ def _free_plan(
     criterion: Criterion,
     fixed: Sequence[Mapping[str, float]],
     robots: Sequence[str],
-    progress: Tell,
+    run: Run,
 ) -> tuple[Plan | None, list[str]]:
     """Return the shortest free schedule with the smallest worst step, or why there is none.
 
@@ -343,7 +369,7 @@ def _free_plan(
         criterion = WorstRatio("worst-ratio-to-rows", tuple(limits))
     try:
         problem = pose(engine, FreeRules(robots=tuple(robots)), criterion, "minmax,steps")
-        plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
+        plan = _solve_run(problem, "schedule_search", run)
     except SeqoptError as error:
         return None, [f"{FREE}: {error}"]
     return on_the_way(plan), []

@@ -23,7 +23,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -33,21 +33,21 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
+from seqopt.graph.formulation import End, Finding, FormulationKind, Run, formulations
 from seqopt.judge._schedules import plan_values
 from seqopt.network.network import build_network
 from seqopt.plan.plan import Plan
-from seqopt.plan.solve import graph_of, on_the_way, pose, solve
+from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
+from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, NOTHING, RegretTable
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.verdict import Verdict
-from seqopt.work import Stage, Tell, _ending
+from seqopt.work import GRACE, Clock, Stage, Tell, _ending
 
 TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
@@ -59,8 +59,7 @@ USUAL_RULES = FreeRules()
 NEAR = "near:6"
 FEW = ("cascade", "path_beam", "schedule_search")  # formulations that need not look at all
 SLOW = ("frame", "discrete")  # engines that come last
-KEPT = 0.7  # share of its time after which what can return its best plan so far does
-NOTHING = 1e-9  # regrets and errors below are none
+KEPT, ALL = 0.7, 0.95  # shares of its time after which a search, and a proof, ends
 Found = TypeVar("Found")
 Valued: TypeAlias = tuple[float, float, str, str]
 """The worst step of a plan and its end, that of its own steps, its status, and why it falls."""
@@ -156,20 +155,20 @@ class _Course:
 
     def row(self, way: Way, seconds: float) -> dict[str, object]:
         """Return the row of a way, which may take so long."""
+        seconds = max(seconds, 1e-3)
         proof, found = way.without != "no proof", list[Finding]()
 
         def call() -> Plan:
             found.clear()
-            how: dict[str, Any] = {"proof": proof, "progress": found.append}
-            if "seconds" in find_formulation(way.formulation).options:
-                how["time_limit"] = KEPT * seconds
-            return on_the_way(solve(self.problem(way), way.formulation, **how))
+            clock = Clock(max(KEPT * seconds, ALL * seconds - GRACE))  # of search and proof
+            run = Run(KEPT * seconds, found.append, proof, clock=clock)
+            return on_the_way(_solve_run(self.problem(way), way.formulation, run))
 
         about = {"engine": way.engine, "schedule": way.schedule, "formulation": way.formulation}
         row = {**about, "without": way.without, "exact": False, "models": 0, "why": ""}
         row |= dict.fromkeys(("seconds", "value", "own", "gap", "error"), np.nan)
         try:
-            took, plan = self.timer.least(max(seconds, 1e-3), call)
+            took, plan = self.timer.least(seconds, call)
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
             return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
@@ -213,43 +212,25 @@ def measure_regret(
     rules: FreeRules = USUAL_RULES,
     seconds: float = 60.0,
     reference: str = "",
+    mortar: Mortar | None = None,
     progress: Tell = lambda _: None,
     timer: Timer = WALL,
 ) -> RegretTable:
     """Return the cost of every way's plan in the most detailed model of a scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        Has the scene; its mortar says where joints may open.
-    criterion : Criterion
-        The cost of a step, of which the largest counts. Of one that ranks candidates the sum is an
-        objective of the loop, and the worst ratio counts.
-    rules : FreeRules, optional
-        Of the free schedule.
-    seconds : float, optional
-        For all ways together, s.
-    reference : str, optional
-        The engine that values plans; by default ``compliance``, with the stiffness of grips that
-        the scene has. Where the engine has a mortar, every step has to stand with it, too, which
-        is proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
-    progress, timer : callable, Timer, optional
-        Called with the progress.
-
-    Returns
-    -------
-    RegretTable
-
-    Raises
-    ------
-    ProblemError
-        If there is no such reference, or no way finds a plan that stands in it.
+    ``criterion``: the cost of a step, of which the largest counts; of one that ranks candidates the
+    sum is an objective of the loop, and the worst ratio counts. ``seconds``: of all ways together.
+    ``reference``: the engine that values plans; by default ``compliance``, with the stiffness of
+    grips that the scene has. ``mortar``: with which every step has to stand, too, by default that
+    of the engine: proven by the equilibrium of joints; ``discrete`` lets these open and slip
+    instead. Raises `ProblemError` if there is no such reference, `NothingFoundError` if no way
+    finds a plan that stands in it.
     """
     start = timer.now()
     check_reference(reference)
     recipe, named = recipe_of(engine), engine
     joints = None if recipe is None else dict(recipe.options).get("mortar")
-    mortar = joints if isinstance(joints, Mortar) else None
+    mortar = mortar or (joints if isinstance(joints, Mortar) else None)
     if reference or recipe is not None:  # else an object of one's own
         own = mortar if reference in LIMITED else None
         named = make_engine(reference or USUAL_ENGINE, engine.network, own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
 COLUMNS = 80  # of a terminal
+NOTHING = 1e-9  # regrets and errors below are none
 MANY = 4  # ways that are counted, not named, where they fail alike
 SAME = 1.1  # times that differ by less are equal: repetitions do
 OF = {"regret": "", "gap": " to its bound", "error": " of its model"}
@@ -44,6 +46,11 @@ def dominated(table: pd.DataFrame) -> Bools:
         better |= values[:, None] < values
     beats = no_later & better & known[:, None]
     return np.asarray(beats.any(axis=0) | ~known)
+
+
+def near(shares: pd.Series[float]) -> pd.Series[float]:
+    """Return shares in half decades: those of one are as good for who is in a hurry."""
+    return shares.map(lambda share: round(2 * math.log10(share)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,8 +94,9 @@ class RegretTable:
 
     @cached_property
     def kept(self) -> Bools:
-        """Which rows no other one beats."""
-        return ~dominated(self.table)
+        """Which rows no other one beats; a proof counts in the model that values plans."""
+        proves = self.table["exact"] & (self.table["engine"] == self.reference)
+        return ~dominated(self.table.assign(exact=proves))
 
     @cached_property
     def is_proven(self) -> bool:
@@ -125,11 +133,14 @@ class RegretTable:
 
     @cached_property
     def sooner(self) -> pd.DataFrame:
-        """The rows that take less time than the one to take: worse ones, or one without a proof."""
+        """The rows that take less time than the one to take: worse ones, or one without a proof.
+
+        Of those that are `near` each other the soonest.
+        """
         soon = self.table[self.kept & (self.table["seconds"] * SAME < self.take["seconds"])]
         worse = soon[soon["regret"] > self.take["regret"]]
-        found = soon if worse.empty else worse
-        return found.sort_values("regret").drop_duplicates("regret")
+        found = (soon if worse.empty else worse).sort_values("seconds")
+        return found[~near(found["regret"].clip(NOTHING)).duplicated()].sort_values("regret")
 
     @property
     def sentence(self) -> str:
@@ -168,7 +179,7 @@ class RegretTable:
         yield from _wrapped(
             f"Regret: what the worst step ({self.worst}) takes, valued by {self.valued}, above "
             f"that {zero}. Gap: to the bound that a way proves in its own model. Error: of the "
-            f"worst step that it promised. All ways had {self.limit:g} s."
+            f"worst step that it promised. All ways had {seconds_text(self.limit)}."
         )
         yield f"{'':41}{'seconds':>9}{'regret':>10}{'gap':>10}{'error':>10}"
         for (engine, schedule), own in self.table.groupby(["engine", "schedule"], sort=False):
