@@ -17,7 +17,14 @@ from seqopt.arrays import Terse
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
-from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError, TimeUpError
+from seqopt.errors import (
+    MechanismError,
+    NothingFoundError,
+    ProblemError,
+    SeqoptError,
+    StepError,
+    TimeUpError,
+)
 from seqopt.graph.formulation import (
     Formulation,
     FormulationKind,
@@ -137,8 +144,7 @@ def compare(
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
     speed : float, optional
-        Seconds in all: to set the speed of every way to a plan against what its plan costs, after
-        a quarter at most for loops, and for the free schedule, that are shown.
+        Seconds in all, to set the speed of every way to a plan against what its plan costs.
     reference : str, optional
         The engine that values these plans; by default the most detailed one with data.
     mortar : Mortar, optional
@@ -158,13 +164,7 @@ def compare(
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
-    grips = {force_column(robot): f"{robot_response(robot.name)} [N]" for robot in scene.robots}
-    others = {RESPONSES[name].column: f"{name} [{LARGEST[name]}]" for name in [*LARGEST][1:]}
-    worst = {
-        name: pd.concat([own[[*grips]].abs(), own[[*others]]], axis=1).max()
-        for name, own in tables.items()
-    }
-    maxima = pd.DataFrame(worst).rename(grips | others)
+    maxima = _maxima(scene, tables)
     in_paper = bool(tables) and is_reference_arch(scene)
     printed = printed_maxima().set_axis(maxima.index) if in_paper else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
@@ -175,9 +175,8 @@ def compare(
     rows |= {name: _row(plan) for name, plan in plans.items()}
     if problem is not None and PUBLISHED in rows and not robots:
         rows[PUBLISHED] |= _published_row(problem, plans.values())
-    free, why = _free_plan(
-        engine, criterion, fixed, robots, Run(PATIENCE, progress, clock=Clock(part))
-    )
+    run = Run(PATIENCE, progress, clock=Clock(part))
+    free, why = _free_plan(engine, criterion, fixed, robots, run)
     if not tables and free is None:  # the first refusal says most
         raise type(refused[0])(f"{refused[0]}; {why[0]}")
     notes += why + late
@@ -195,15 +194,28 @@ def compare(
     table, faults = _table(scene, rows, tables, left, verdicts)
     notes += faults
     notes += [f"In the paper: {text}" for text in IRREGULARITIES] if in_paper else []
-    found = (maxima, printed, table, tables, tuple(notes), refusal, left)
-    enough = what_was_enough(within, tables)
     measured = None
     if speed:
         how: dict[str, Any] = {"reference": reference, "mortar": mortar, "progress": progress}
-        how |= {"seconds": max(whole.left, speed / 2)}
-        how |= {} if free is None else {"rules": free.states.rules}
-        measured = measure_regret(asked, criterion, **how)
+        how |= {"rules": FreeRules(robots=tuple(robots)), "seconds": max(whole.left, speed / 2)}
+        try:
+            measured = measure_regret(asked, criterion, **how)
+        except NothingFoundError as error:
+            notes.append(str(error))
+    found = (maxima, printed, table, tables, tuple(notes), refusal, left)
+    enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
+
+
+def _maxima(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return the largest value of any step, a row per quantity, a column per build."""
+    grips = {force_column(robot): f"{robot_response(robot.name)} [N]" for robot in scene.robots}
+    others = {RESPONSES[name].column: f"{name} [{LARGEST[name]}]" for name in [*LARGEST][1:]}
+    worst = {
+        name: pd.concat([own[[*grips]].abs(), own[[*others]]], axis=1).max()
+        for name, own in tables.items()
+    }
+    return pd.DataFrame(worst).rename(grips | others)
 
 
 def _table(
@@ -235,10 +247,7 @@ def _table(
 def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str], clock: Clock
 ) -> tuple[dict[str, Plan], Problem | None, str, list[str]]:
-    """Return the plans of all formulations and the problem of the loop, or why there is none.
-
-    Last a note of those that the clock ended.
-    """
+    """Return plans by formulation, the loop's problem, or why there is none, and who was late."""
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
     plans, late = dict[str, Plan](), list[str]()

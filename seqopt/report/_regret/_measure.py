@@ -95,11 +95,9 @@ WALL = Timer()
 
 @dataclass(frozen=True)
 class Way:
-    """One way to a plan.
+    """One way to a plan; what it leaves out, or adds, is the last word.
 
-    ``engine``: a name, or `RIGID_GRIPS`; ``schedule``: `LOOP` or `FREE`; ``without``: what it
-    leaves out, or adds: ``no proof``, ``near:6`` (candidates), ``ranks`` (the objective) or
-    ``stands`` (states proven to stand).
+    That is ``no proof``, ``near:6``, ``ranks`` or ``stands`` (states are proven to stand).
     """
 
     engine: str
@@ -185,6 +183,23 @@ class _Course:
         row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
         return row | {"models": plan.models, "status": status, "why": why}
 
+    def rows(
+        self, ways: Sequence[Way], seconds: float, progress: Tell
+    ) -> Iterator[tuple[dict[str, object], Sequence[Finding]]]:
+        """Yield the rows of ways, which share the time, with incumbents and bounds."""
+        late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
+        end = self.timer.now() + seconds
+        for done, way in enumerate(ways):
+            progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
+            left, others = end - self.timer.now(), len(ways) - done
+            most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
+            self.findings.clear()
+            skips = (way.engine, way.schedule) in late and way.formulation not in FEW
+            row = self.row(way, 0.0 if skips else max(left / others, most))
+            if row["status"] == CUT and way.formulation not in FEW:
+                late.add((way.engine, way.schedule))
+            yield row, tuple(self.findings)
+
     def _value(self, steps: Sequence[Step]) -> Valued:
         """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
         last, bare = steps[-1], (None,) * len(steps[-1].grips)
@@ -218,13 +233,10 @@ def measure_regret(
 ) -> RegretTable:
     """Return the cost of every way's plan in the most detailed model of a scene.
 
-    ``criterion``: the cost of a step, of which the largest counts; of one that ranks candidates the
-    sum is an objective of the loop, and the worst ratio counts. ``seconds``: of all ways together.
-    ``reference``: the engine that values plans; by default ``compliance``, with the stiffness of
-    grips that the scene has. ``mortar``: with which every step has to stand, too, by default that
-    of the engine: proven by the equilibrium of joints; ``discrete`` lets these open and slip
-    instead. Raises `ProblemError` if there is no such reference, `NothingFoundError` if no way
-    finds a plan that stands in it.
+    Of a criterion that ranks candidates the worst ratio counts; the sum is an objective of the
+    loop. ``mortar``: with which every step is proven to stand, by default that of the engine; with
+    a ``reference`` that is ``discrete`` joints open and slip instead. Raises `ProblemError` if
+    there is no such reference, `NothingFoundError` if no way finds a plan that stands in it.
     """
     start = timer.now()
     check_reference(reference)
@@ -240,19 +252,10 @@ def measure_regret(
     with suppress(SeqoptError):
         loop = find_schedule(engine.network)
     course = _Course(problem, criterion, loop, rules, mortar, timer)
-    name, rows, curves = _name_of(named), list[dict[str, object]](), list[Sequence[Finding]]()
+    name = _name_of(named)
     ways, refused = _ways(course, name)
-    late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
-    for done, way in enumerate(ways):
-        progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
-        left, others = seconds - (timer.now() - start), len(ways) - done
-        most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
-        course.findings.clear()
-        skips = (way.engine, way.schedule) in late and way.formulation not in FEW
-        rows.append(course.row(way, 0.0 if skips else max(left / others, most)))
-        if rows[-1]["status"] == CUT and way.formulation not in FEW:
-            late.add((way.engine, way.schedule))
-        curves.append(tuple(course.findings))
+    found = course.rows(ways, seconds - (timer.now() - start), progress)
+    rows, curves = zip(*found, strict=True)
     table = pd.DataFrame(rows)
     best = table["value"].min()
     regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
@@ -260,7 +263,8 @@ def measure_regret(
     table = table.assign(regret=regret, error=error)
     if not np.isfinite(best):
         why = next((f": {row['engine']}, {row['why']}" for row in rows if row["why"]), "")
-        raise NothingFoundError(f"regret: no plan holds in the reference{why}; give more seconds")
+        more = "; give more seconds" * bool((table["status"] == CUT).any())
+        raise NothingFoundError(f"regret: no plan holds in the reference{why}{more}")
     scene = engine.network.scene
     soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
     stands = ", where every step stands" * (mortar is not None and name != "discrete")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,9 +22,16 @@ if TYPE_CHECKING:
 DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
 COLUMNS = 80  # of a terminal
 NOTHING = 1e-9  # regrets and errors below are none
+HALF_DECADE = 0.5
 MANY = 4  # ways that are counted, not named, where they fail alike
 SAME = 1.1  # times that differ by less are equal: repetitions do
+LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
 OF = {"regret": "", "gap": " to its bound", "error": " of its model"}
+PARTS = {
+    "regret": ("D", "regret"),
+    "gap": ("|", "proven gap"),
+    "error": ("x", "error of the model"),
+}
 USUAL_NAMES = ("overlap_dp", "schedule_search")
 NAMED = {FREE: "the free schedule", "loop": "the loop"}
 
@@ -48,9 +54,12 @@ def dominated(table: pd.DataFrame) -> Bools:
     return np.asarray(beats.any(axis=0) | ~known)
 
 
-def near(shares: pd.Series[float]) -> pd.Series[float]:
-    """Return shares in half decades: those of one are as good for who is in a hurry."""
-    return shares.map(lambda share: round(2 * math.log10(share)))
+def apart(shares: pd.Series[float]) -> Bools:
+    """Return which shares differ by more than half a decade from those kept before."""
+    logs, kept = np.log10(shares.clip(lower=NOTHING).to_numpy()), list[int]()
+    for i, each in enumerate(logs):
+        kept += [i] * bool((np.abs(logs[kept] - each) > HALF_DECADE).all())
+    return np.isin(np.arange(len(logs)), kept)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,6 +107,25 @@ class RegretTable:
         proves = self.table["exact"] & (self.table["engine"] == self.reference)
         return ~dominated(self.table.assign(exact=proves))
 
+    @property
+    def front(self) -> pd.DataFrame:
+        """The rows that are worth a name, those near each other once, the one to take first."""
+        kept = self.table[self.kept].sort_values("seconds")
+        kept = kept[kept["regret"] <= kept["regret"].cummin()]
+        kept = kept.sort_index(key=lambda names: names != self.take.name, kind="stable")
+        return kept[apart(kept["regret"])]
+
+    @property
+    def alike(self) -> pd.DataFrame:
+        """A row for the ways whose regret has the same parts, and how many; the best last."""
+        own = self.table[np.isfinite(self.table["regret"].to_numpy(float))]
+        own = own.assign(other=~own["formulation"].isin(USUAL_NAMES) | (own["without"] != ""))
+        own = own.sort_values(["regret", "other", "seconds"])
+        by = [own["engine"], own["schedule"], *(own[part].map(percent) for part in PARTS)]
+        alike = own.groupby(by, sort=False)
+        found: pd.DataFrame = alike.head(1).assign(ways=alike["regret"].size().to_numpy())[::-1]
+        return found
+
     @cached_property
     def is_proven(self) -> bool:
         """Whether no plan of the free schedule is better in the reference than the best known."""
@@ -110,7 +138,8 @@ class RegretTable:
 
         Of those that are equally soon one of the reference, and the usual formulation.
         """
-        best = self.table[self.kept & (self.table["status"] == DONE)]
+        done = self.kept & (self.table["status"] == DONE)
+        best = self.table[done if done.any() else self.kept]  # all that have a plan were stopped
         best = best[best["regret"] == best["regret"].min()]
         best = best[best["exact"] == best["exact"].max()]
         best = best[best["seconds"] <= SAME * best["seconds"].min()]
@@ -135,12 +164,12 @@ class RegretTable:
     def sooner(self) -> pd.DataFrame:
         """The rows that take less time than the one to take: worse ones, or one without a proof.
 
-        Of those that are `near` each other the soonest.
+        Of those that are not `apart` the soonest.
         """
         soon = self.table[self.kept & (self.table["seconds"] * SAME < self.take["seconds"])]
         worse = soon[soon["regret"] > self.take["regret"]]
         found = (soon if worse.empty else worse).sort_values("seconds")
-        return found[~near(found["regret"].clip(NOTHING)).duplicated()].sort_values("regret")
+        return found[apart(found["regret"])].sort_values("regret")
 
     @property
     def sentence(self) -> str:
