@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 from seqopt._files import Page
-from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import engine_mortar, find_engine
 from seqopt.errors import ProblemError
@@ -80,7 +79,7 @@ def compare(  # noqa: PLR0913  # every question is a word of its own
     tell = progress or (lambda _: None)
     named = () if robots is None or isinstance(robots, int) else robots
     proven = prover or find_prover(own.network, mortar, progress, asks=stability)
-    joints = None if mortar is None else find_mortar(mortar)
+    joints = engine_mortar(None, mortar, verdicts=False)
     return compare_builds(own, costs, tell, named, proven, speed, reference, joints)
 
 

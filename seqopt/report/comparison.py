@@ -25,13 +25,7 @@ from seqopt.errors import (
     StepError,
     TimeUpError,
 )
-from seqopt.graph.formulation import (
-    Formulation,
-    FormulationKind,
-    Run,
-    find_formulation,
-    formulations,
-)
+from seqopt.graph.formulation import Formulation, Run, find_formulation, formulations
 from seqopt.plan.plan import Plan
 from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum, WorstRatio
@@ -489,7 +483,7 @@ def _rows(
     def plainness(name: str) -> tuple[bool, bool, str]:
         if (own := found.get(name)) is None:
             return False, False, name
-        return own.kind is not FormulationKind.EXACT, own.takes_budgets, name
+        return own.kind.value != "exact", own.takes_budgets, name
 
     for problem, rows in table.groupby("problem", sort=False):
         yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")

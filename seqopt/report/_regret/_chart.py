@@ -16,12 +16,12 @@ from matplotlib.ticker import NullLocator
 
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Finding
-from seqopt.report._regret._table import LOST, NAMED, PARTS, RegretTable, percent, seconds_text
+from seqopt.report._regret._table import LOST, PARTS, RegretTable, _short, percent, seconds_text
 from seqopt.report._style import GREEN, INK, SMALL, WIDTH, dress, look, new_figure, plain, styled
 from seqopt.sequence.rules import FREE
 
 ENGINES = ("compliance", "rigid grips", "frame", "discrete")  # in the order of their looks
-MARKS = {"loop": "o", FREE: "s"}
+MARKS = {"loop": ("o", "the loop"), FREE: ("s", "the free schedule")}
 PALE = 0.28
 LEAST = 1e-6  # what is less is drawn in the band of none
 MOST = 1e-3  # from which on an axis is logarithmic, unless regrets are less
@@ -39,11 +39,10 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     """Return the chart of one scene, with the parts of regret, or of several side by side."""
     across = 1 if width < WIDTH or len(tables) == 1 else 2
     if len(tables) == 1:
-        parts = tables[0].alike
-        heights = [4.4, 0.6 + 0.36 * len(parts)]
+        heights = [4.4, 0.6 + 0.36 * len(tables[0].alike)]
         figure = new_figure(0.7 + sum(heights), width)
         panels = figure.subplots(2, 1, height_ratios=heights)
-        _draw_parts(panels[1], parts)
+        _draw_parts(panels[1], tables[0].alike)
         dress(panels[1])
     else:
         rows = -(-len(tables) // across)
@@ -54,35 +53,24 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     for letter, axes, each in zip("abcdefgh", panels, tables, strict=False):
         _regrets(axes, each)
         took = each.take
-        words = f"take {took['engine']}, {_words(took)}: {seconds_text(took['seconds'])}"
+        words = f"take {took['engine']}, {_short(took)}: {seconds_text(took['seconds'])}"
         begin, end = (f"({letter}) ", "") if tables[1:] else ("", f", valued by {each.valued}")
-        lines = [f"{begin}{each.scene}, {each.bricks} bricks{end}", words]
+        lines = [f"{begin}{each.scene}, {each.bricks} bricks{end}", words.replace("_", " ")]
         most = int((width / across - 0.6) / LETTER)
-        title = "\n".join(textwrap.fill(line, most) for line in lines)
-        axes.set_title(title, fontsize=SMALL)
-        without = textwrap.fill(_without_point(each.table), most - 6)
+        axes.set_title("\n".join(textwrap.fill(line, most) for line in lines), fontsize=SMALL)
+        lost = each.table[~np.isfinite(each.table["regret"].to_numpy(float))]
+        counts = lost.groupby(["engine", "status"], sort=False).size().to_dict().items()
+        lines = [f"{engine} {count} {LOST[status]}" for (engine, status), count in counts]
+        without = textwrap.fill("no point: " * bool(lines) + ", ".join(lines), most - 6)
         axes.set_xlabel(f"time from scene to plan [s]\n{without}".strip(), fontsize=SMALL)
         dress(axes)
     _legend(figure, tables, 2 if width < WIDTH else 4)
     return figure
 
 
-def _words(row: pd.Series[float]) -> str:
-    words = str(row["formulation"]).replace("_", " ")
-    return f"{words}, {row['without']}" if row["without"] else words
-
-
-def _without_point(table: pd.DataFrame) -> str:
-    """Return how many ways failed or were stopped, in words; the table names them, and why."""
-    lost = table[~np.isfinite(table["regret"].to_numpy(float))]
-    counts = lost.groupby(["engine", "status"], sort=False).size().to_dict().items()
-    words = [f"{engine} {count} {LOST[status]}" for (engine, status), count in counts]
-    return "no point: " * bool(words) + ", ".join(words)
-
-
 def _look(engine: str, schedule: str, *, filled: bool = True) -> dict[str, Any]:
     known = ENGINES.index(engine) if engine in ENGINES else len(ENGINES)
-    return look(known).mark(filled=filled) | {"marker": MARKS[schedule]}
+    return look(known).mark(filled=filled) | {"marker": MARKS[schedule][0]}
 
 
 def _regrets(axes: Axes, table: RegretTable) -> None:
@@ -109,7 +97,7 @@ def _regrets(axes: Axes, table: RegretTable) -> None:
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
     for _, row in table.front.iterrows():
         engine = f"{row['engine']}: " * (row["engine"] != table.reference)
-        words = textwrap.fill(engine + _words(row), LINE)
+        words = textwrap.fill(engine + _short(row).replace("_", " "), LINE)
         at = float(row["seconds"]), float(row["regret"])
         spot, va = BELOW if row["regret"] > LEAST and at[0] > kept["seconds"].min() else ABOVE
         text = axes.annotate(words, at, spot, va=va, path_effects=HALO, zorder=2, **beside)
@@ -147,7 +135,7 @@ def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:
             mark |= {"marker": marker, "ms": 6 if name == "regret" else 12}
             axes.plot(row[name] if np.isfinite(row[name]) else np.nan, line, clip_on=False, **mark)
         more = f" and {row['ways'] - 1} more" * (row["ways"] > 1)
-        words = f"{row['engine']}, {row['schedule']}: {_words(row)}{more}"
+        words = f"{row['engine']}, {row['schedule']}: {_short(row).replace('_', ' ')}{more}"
         place: Any = {"transform": axes.get_yaxis_transform(), "path_effects": HALO}
         axes.text(0.01, line + 0.28, words, fontsize=SMALL, **place)
     axes.set_yticks(range(len(rows)), [])
@@ -177,7 +165,7 @@ def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
     present = dict.fromkeys(str(name) for each in tables for name in each.table["engine"])
     marks = [Line2D([], [], label=name, **_look(name, FREE) | {"marker": "o"}) for name in present]
     mark: dict[str, Any] = {"ls": "none", "color": INK}
-    marks += [Line2D([], [], **mark, marker=MARKS[kind], label=NAMED[kind]) for kind in MARKS]
+    marks += [Line2D([], [], **mark, marker=m, label=words) for m, words in MARKS.values()]
     marks += [
         Line2D([], [], **mark, marker="o", mfc="white", label="not proven"),
         Line2D([], [], **mark, marker="o", alpha=PALE, label="dominated"),

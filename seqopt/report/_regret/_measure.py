@@ -10,11 +10,10 @@ model that the scene has data for,
 
 So what a search missed and what a model got wrong are one number, as a builder meets them. The end
 counts for all: a loop leaves its robots where they are, and what then bears itself is asked of it
-as of a free schedule. Beside it stand its parts: the *gap* of the plan to the bound that the way
-proves, in its own model, and the *error* of the worst step that its own model promised.
+as of a free schedule. Its parts are the *gap* of the plan to the bound that the way proves, in its
+own model, and the *error* of the worst step that its own model promised.
 
-All ways share the time limit: one that needs less leaves more to those after it. Each is
-repeated up to `TIMES` times where that takes little; the least time counts.
+All ways share the time limit. Each is repeated up to `TIMES` times where that takes little.
 """
 
 from __future__ import annotations
@@ -61,8 +60,8 @@ FEW = ("cascade", "path_beam", "schedule_search")  # formulations that need not 
 SLOW = ("frame", "discrete")  # engines that come last
 KEPT, ALL = 0.7, 0.95  # shares of its time after which a search, and a proof, ends
 Found = TypeVar("Found")
-Valued: TypeAlias = tuple[float, float, str, str]
-"""The worst step of a plan and its end, that of its own steps, its status, and why it falls."""
+Row: TypeAlias = tuple[dict[str, object], Sequence[Finding]]  # with incumbents and bounds
+Valued: TypeAlias = tuple[float, float, str, str]  # with the end, without, status, why it falls
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,6 @@ class _Course:
     rules: FreeRules
     mortar: Mortar | None
     timer: Timer
-    findings: list[Finding] = field(default_factory=list)
     known: dict[Sequence[Step], Valued] = field(default_factory=dict)
 
     def engine(self, name: str) -> Engine:
@@ -146,12 +144,11 @@ class _Course:
 
     def _schedule(self, engine: Engine, near: str) -> Schedule:
         assert self.loop is not None  # else no way asks for it
-        found = (
-            find_schedule(engine.network) if engine.network.scene != self.loop.scene else self.loop
-        )
+        other = engine.network.scene != self.loop.scene
+        found = find_schedule(engine.network) if other else self.loop
         return thin(found, near) if near else found
 
-    def row(self, way: Way, seconds: float) -> dict[str, object]:
+    def row(self, way: Way, seconds: float) -> Row:
         """Return the row of a way, which may take so long."""
         seconds = max(seconds, 1e-3)
         proof, found = way.without != "no proof", list[Finding]()
@@ -169,8 +166,7 @@ class _Course:
             took, plan = self.timer.least(seconds, call)
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
-            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
-        self.findings[:] = [each for each in found if isinstance(each, Finding)]
+            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}, ()
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]
@@ -181,24 +177,22 @@ class _Course:
         exact = gap == 0 and way.without not in (NEAR, "ranks")
         row |= {"seconds": took, "value": value, "gap": gap, "exact": exact}
         row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
-        return row | {"models": plan.models, "status": status, "why": why}
+        row |= {"models": plan.models, "status": status, "why": why}
+        return row, [each for each in found if isinstance(each, Finding)]
 
-    def rows(
-        self, ways: Sequence[Way], seconds: float, progress: Tell
-    ) -> Iterator[tuple[dict[str, object], Sequence[Finding]]]:
-        """Yield the rows of ways, which share the time, with incumbents and bounds."""
+    def rows(self, ways: Sequence[Way], seconds: float, progress: Tell) -> Iterator[Row]:
+        """Yield the rows of ways, which share the time."""
         late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
         end = self.timer.now() + seconds
         for done, way in enumerate(ways):
             progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
             left, others = end - self.timer.now(), len(ways) - done
             most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
-            self.findings.clear()
             skips = (way.engine, way.schedule) in late and way.formulation not in FEW
-            row = self.row(way, 0.0 if skips else max(left / others, most))
+            row, found = self.row(way, 0.0 if skips else max(left / others, most))
             if row["status"] == CUT and way.formulation not in FEW:
                 late.add((way.engine, way.schedule))
-            yield row, tuple(self.findings)
+            yield row, found
 
     def _value(self, steps: Sequence[Step]) -> Valued:
         """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
@@ -254,8 +248,7 @@ def measure_regret(
     course = _Course(problem, criterion, loop, rules, mortar, timer)
     name = _name_of(named)
     ways, refused = _ways(course, name)
-    found = course.rows(ways, seconds - (timer.now() - start), progress)
-    rows, curves = zip(*found, strict=True)
+    rows, curves = zip(*course.rows(ways, seconds - timer.now() + start, progress), strict=True)
     table = pd.DataFrame(rows)
     best = table["value"].min()
     regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)

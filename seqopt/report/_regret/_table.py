@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
 COLUMNS = 80  # of a terminal
 NOTHING = 1e-9  # regrets and errors below are none
-HALF_DECADE = 0.5
 MANY = 4  # ways that are counted, not named, where they fail alike
 SAME = 1.1  # times that differ by less are equal: repetitions do
 LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
@@ -39,9 +38,8 @@ NAMED = {FREE: "the free schedule", "loop": "the loop"}
 def dominated(table: pd.DataFrame) -> Bools:
     """Return which rows are dominated: another is as good in everything, and better in something.
 
-    ``table``: with ``seconds``, ``regret`` and ``exact``: what proves its plan is not dominated by
-    what does not. A row without a plan that holds is dominated. Times count as equal where they
-    differ by less than `SAME`, so that noise decides nothing.
+    What proves its plan (``exact``) is not dominated by what does not; a row without a plan that
+    holds is. Times that differ by less than `SAME` are equal, so that noise decides nothing.
     """
     known = np.isfinite(table[["seconds", "regret"]].to_numpy(float)).all(axis=1)
     seconds, proves = table["seconds"].to_numpy(float), table["exact"].to_numpy(bool)
@@ -58,7 +56,7 @@ def apart(shares: pd.Series[float]) -> Bools:
     """Return which shares differ by more than half a decade from those kept before."""
     logs, kept = np.log10(shares.clip(lower=NOTHING).to_numpy()), list[int]()
     for i, each in enumerate(logs):
-        kept += [i] * bool((np.abs(logs[kept] - each) > HALF_DECADE).all())
+        kept += [i] * bool((np.abs(logs[kept] - each) > 0.5).all())
     return np.isin(np.arange(len(logs)), kept)
 
 
@@ -67,14 +65,13 @@ class RegretTable:
     """What the plans of all ways cost in the most detailed model of one scene.
 
     ``reference``: the engine that values plans, and ``valued`` with what it takes into account;
-    ``worst``: the criterion whose largest value of any step counts; ``limit``: of all ways
-    together, s; ``table``: a row per ``engine``, ``schedule``, ``formulation`` and what is left out
+    ``worst``: the criterion whose largest value counts; ``limit``: of all ways together, s;
+    ``table``: a row per ``engine``, ``schedule``, ``formulation`` and what it leaves out
     (``without``), with the ``seconds`` from scene to plan, its ``value`` in the reference and in
-    its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves
-    and the ``error`` of what its model promised; whether it proves its plan (``exact``), the
-    ``models`` that it solved, its ``status``, and ``why`` there is no plan, or none that holds;
-    ``refused``: engines that cannot model the scene, and why; ``curves``: incumbents and bounds
-    over time, row by row.
+    its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves,
+    the ``error`` of what its model promised, whether it proves its plan (``exact``), ``models``
+    solved, its ``status``, and ``why`` there is no plan, or none that holds; ``refused``: engines
+    that cannot model the scene, and why; ``curves``: incumbents and bounds over time, row by row.
     """
 
     scene: str
@@ -162,10 +159,7 @@ class RegretTable:
 
     @cached_property
     def sooner(self) -> pd.DataFrame:
-        """The rows that take less time than the one to take: worse ones, or one without a proof.
-
-        Of those that are not `apart` the soonest.
-        """
+        """The rows that are sooner than the one to take, `apart`: worse, or without a proof."""
         soon = self.table[self.kept & (self.table["seconds"] * SAME < self.take["seconds"])]
         worse = soon[soon["regret"] > self.take["regret"]]
         found = (soon if worse.empty else worse).sort_values("seconds")
