@@ -10,6 +10,7 @@ import pytest
 import seqopt
 from seqopt.errors import NothingFoundError
 from seqopt.plan.solve import graph_of
+from seqopt.report import compare
 from seqopt.report._regret._chart import PALE, regret_chart
 from seqopt.report._regret._measure import RIGID_GRIPS, Timer, measure_regret
 from seqopt.report._regret._table import CUT, DONE, FALLS, SAME, RegretTable, dominated
@@ -80,24 +81,17 @@ def test_what_to_take_is_computed():
     unproven = made(FOUR[1])
     assert not unproven.is_proven
     assert "no plan known is better" not in unproven.sentence  # it is not the best known
+    stopped = replace(unproven, table=unproven.table.assign(status=CUT))
+    assert stopped.take["formulation"] == "cascade"  # nothing else has a plan
     luck = made(FOUR[0], ("compliance", FREE, "path_beam", "", False, 0.05, 0.0))
     assert luck.take["formulation"] == "schedule_search"  # what proves comes first
     assert luck.sentence.endswith(
         "sooner is compliance with path_beam on the free schedule in 0.0500 s: its plan is as "
         "good, without a proof."
     )
-    assert luck.shown.iloc[1].to_dict() == {
-        "engine": "compliance",
-        "schedule": FREE,
-        "formulation": "path_beam",
-        "time, s": 0.05,
-        "regret": "0",
-        "gap to its bound": "0",
-        "error of its model": "0",
-        "proven": "",
-        "models": 1,
-        "outcome": DONE,
-    }
+    heads = "engine|schedule|formulation|time, s|regret|gap to its bound|error of its model"
+    assert "|".join(luck.shown) == f"{heads}|proven|models|outcome"
+    assert [*luck.shown.iloc[1]] == [*FOUR[0][:2], "path_beam", 0.05, *"000", "", 1, DONE]
 
 
 @pytest.fixture(scope="module")
@@ -217,3 +211,7 @@ def test_what_is_stopped_is_said():
     assert any("stopped" in line for line in found.lines())
     with pytest.raises(NothingFoundError, match="give more seconds"):
         measure_regret(engine, WORST, seconds=60.0, timer=Timer(within=_Late(0).within))
+    short = compare(engine, WORST, speed=1e-6)  # what takes no search is there
+    assert (short.speed, {"sequential", "cantilever"} == {*short.table.index}) == (None, True)
+    for words in ("lack of time: modified-sequential, beam, cascade", "give more seconds"):
+        assert words in " ".join(short.notes)

@@ -131,10 +131,7 @@ class RegretTable:
 
     @cached_property
     def take(self) -> pd.Series[float]:
-        """The row to take: of the least regret, one that proves its plan if any does, the soonest.
-
-        Of those that are equally soon one of the reference, and the usual formulation.
-        """
+        """The row to take: of least regret, proven if any is, soonest, of the reference, usual."""
         done = self.kept & (self.table["status"] == DONE)
         best = self.table[done if done.any() else self.kept]  # all that have a plan were stopped
         best = best[best["regret"] == best["regret"].min()]
