@@ -36,11 +36,11 @@ from experiments.calibration.parts.barrel_vaults import (
     laws,
     vaults,
 )
-from experiments.harness.charts import note, subplots, ticks
+from experiments.harness.charts import name_panels, note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.arrays import Floats
-from seqopt.report._style import BLUE, VERMILION, dress, name_panels, styled
+from seqopt.report._style import BLUE, VERMILION, dress, styled
 
 LEVEL = 0.95
 DECISIVE = 5  # the test whose error the paper's column owes most of its mean to

@@ -26,3 +26,9 @@ def ticks(values: Sequence[float], *axes: Axis) -> None:
     for axis in axes:
         axis.set_ticks(values, [f"{value:g}" for value in values])
         axis.set_ticks([], minor=True)
+
+
+def name_panels(*panels: Axes) -> None:
+    """Put a letter before the title of each panel, so that a text can name it."""
+    for letter, axes in zip("abcdefghijkl", panels, strict=False):
+        axes.set_title(f"({letter}) {axes.get_title(loc='left')}", loc="left")

@@ -29,7 +29,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
-from experiments.harness.charts import note, subplots
+from experiments.harness.charts import name_panels, note, subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import drawn, markdown, stored, two
 from experiments.instances.parts.cp_sat import as_cp_sat
@@ -43,7 +43,7 @@ from seqopt.graph.graph import fewest_moves, reached
 from seqopt.instances._solve import _claims
 from seqopt.instances.model import Instance
 from seqopt.report import _style as inks
-from seqopt.report._style import dress, name_panels, plain, styled
+from seqopt.report._style import dress, plain, styled
 
 OUTSIDE = ("HiGHS", "CP-SAT")
 MOST_ARCS = 20_000  # of what outside solvers are given

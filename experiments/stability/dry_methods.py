@@ -18,7 +18,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.harness.charts import note, subplots
+from experiments.harness.charts import name_panels, note, subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25, longer, method_steps
@@ -28,7 +28,7 @@ from seqopt.contact.assembly import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.network import GROUND
-from seqopt.report._style import GRAY, dress, looks, name_panels, plain, styled
+from seqopt.report._style import GRAY, dress, looks, plain, styled
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.methods import METHODS, three_robot_loop
 from seqopt.stability._steps import assess_steps, stability_table

@@ -79,7 +79,8 @@ def compare(  # noqa: PLR0913  # every question is a word of its own
     tell = progress or (lambda _: None)
     named = () if robots is None or isinstance(robots, int) else robots
     proven = prover or find_prover(own.network, mortar, progress, asks=stability)
-    return compare_builds(own, costs, tell, named, proven, speed, reference)
+    joints = engine_mortar(None, mortar, verdicts=False)
+    return compare_builds(own, costs, tell, named, proven, speed, reference, joints)
 
 
 def own_engine(

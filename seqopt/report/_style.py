@@ -129,12 +129,6 @@ def plain(*axes: Axis) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def name_panels(*panels: Axes) -> None:
-    """Put a letter before the title of each panel, so that a text can name it."""
-    for letter, axes in zip("abcdefghijkl", panels, strict=False):
-        axes.set_title(f"({letter}) {axes.get_title(loc='left')}", loc="left")
-
-
 @styled
 def picture_files(name: str, figure: Figure) -> dict[str, bytes]:
     """Return a figure as PNG and as SVG by file name, always with the same bytes."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,12 +14,20 @@ import pandas as pd
 
 from seqopt.arms._kept import arm_faults
 from seqopt.arrays import Terse
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
-from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
-from seqopt.graph.formulation import Formulation, FormulationKind, find_formulation, formulations
+from seqopt.errors import (
+    MechanismError,
+    NothingFoundError,
+    ProblemError,
+    SeqoptError,
+    StepError,
+    TimeUpError,
+)
+from seqopt.graph.formulation import Formulation, Run, find_formulation, formulations
 from seqopt.plan.plan import Plan
-from seqopt.plan.solve import graph_of, on_the_way, pose, solve
+from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import _prop_faults, overloads
@@ -50,7 +60,7 @@ from seqopt.study import (
     printed_maxima,
     published_plan,
 )
-from seqopt.work import Stage, Tell
+from seqopt.work import Clock, Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
 MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
@@ -115,6 +125,7 @@ def compare(
     prover: BuildProver | None = None,
     speed: float = 0.0,
     reference: str = "",
+    mortar: Mortar | None = None,
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
@@ -127,9 +138,11 @@ def compare(
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
     speed : float, optional
-        Seconds for all ways to a plan together, to set their speed against what their plans cost.
+        Seconds in all, to set the speed of every way to a plan against what its plan costs.
     reference : str, optional
         The engine that values these plans; by default the most detailed one with data.
+    mortar : Mortar, optional
+        With which every step of these plans has to stand.
 
     Returns
     -------
@@ -145,31 +158,22 @@ def compare(
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
-    grips = {force_column(robot): f"{robot_response(robot.name)} [N]" for robot in scene.robots}
-    others = {RESPONSES[name].column: f"{name} [{LARGEST[name]}]" for name in [*LARGEST][1:]}
-    worst = {
-        name: pd.concat([own[[*grips]].abs(), own[[*others]]], axis=1).max()
-        for name, own in tables.items()
-    }
-    maxima = pd.DataFrame(worst).rename(grips | others)
+    maxima = _maxima(scene, tables)
     in_paper = bool(tables) and is_reference_arch(scene)
     printed = printed_maxima().set_axis(maxima.index) if in_paper else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
     fixed = [largest(scene, table) for table in tables.values()]
-    plans, problem, refusal = _plans(engine, criterion, progress, robots)
+    whole, part = Clock(speed or math.inf), speed / 4 or math.inf
+    plans, problem, refusal, late = _plans(engine, criterion, progress, robots, Clock(part))
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     if problem is not None and PUBLISHED in rows and not robots:
         rows[PUBLISHED] |= _published_row(problem, plans.values())
-    free, why = _free_plan(engine, criterion, fixed, robots, progress)
+    run = Run(PATIENCE, progress, clock=Clock(part))
+    free, why = _free_plan(engine, criterion, fixed, robots, run)
     if not tables and free is None:  # the first refusal says most
         raise type(refused[0])(f"{refused[0]}; {why[0]}")
-    measured = None
-    if speed:
-        how: dict[str, Any] = {"seconds": speed, "reference": reference, "progress": progress}
-        how |= {} if free is None else {"rules": free.states.rules}
-        measured = measure_regret(asked, criterion, **how)
-    notes += why
+    notes += why + late
     criteria: dict[str, Criterion] = {}
     if problem is not None:
         loop_name = problem.method
@@ -184,9 +188,28 @@ def compare(
     table, faults = _table(scene, rows, tables, left, verdicts)
     notes += faults
     notes += [f"In the paper: {text}" for text in IRREGULARITIES] if in_paper else []
+    measured = None
+    if speed:
+        how: dict[str, Any] = {"reference": reference, "mortar": mortar, "progress": progress}
+        how |= {"rules": FreeRules(robots=tuple(robots)), "seconds": max(whole.left, speed / 2)}
+        try:
+            measured = measure_regret(asked, criterion, **how)
+        except NothingFoundError as error:
+            notes.append(str(error))
     found = (maxima, printed, table, tables, tuple(notes), refusal, left)
     enough = what_was_enough(within, tables)
     return Comparison(*found, criteria, verdicts, enough, measured)
+
+
+def _maxima(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return the largest value of any step, a row per quantity, a column per build."""
+    grips = {force_column(robot): f"{robot_response(robot.name)} [N]" for robot in scene.robots}
+    others = {RESPONSES[name].column: f"{name} [{LARGEST[name]}]" for name in [*LARGEST][1:]}
+    worst = {
+        name: pd.concat([own[[*grips]].abs(), own[[*others]]], axis=1).max()
+        for name, own in tables.items()
+    }
+    return pd.DataFrame(worst).rename(grips | others)
 
 
 def _table(
@@ -216,18 +239,22 @@ def _table(
 
 
 def _plans(
-    engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
-) -> tuple[dict[str, Plan], Problem | None, str]:
-    """Return the plans of all formulations and the problem of the loop, or why there is none."""
+    engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str], clock: Clock
+) -> tuple[dict[str, Plan], Problem | None, str, list[str]]:
+    """Return plans by formulation, the loop's problem, or why there is none, and who was late."""
     network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
-    plans: dict[str, Plan] = {}
+    plans, late = dict[str, Plan](), list[str]()
 
     def solved(schedule: Schedule, named: Mapping[str, Formulation]) -> Problem:
         problem = pose(engine, schedule, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(named.items()):
             progress(Stage("comparing", (done + 1) / (len(named) + 1)))
-            plans[name] = on_the_way(solve(problem, formulation))
+            late.append(name)
+            with suppress(TimeUpError):
+                plan = on_the_way(_solve_run(problem, formulation, Run(clock=clock)))
+                if plan.certificate is not None:
+                    plans[late.pop()] = plan
         return problem
 
     try:
@@ -235,9 +262,10 @@ def _plans(
         if count >= MOST:
             cascade = {"modified-sequential": find_formulation("cascade")}
             solved(modified_sequential(network, robots[:3]), cascade)
-        return plans, solved(loop, formulations("costs")), ""
+        problem = solved(loop, formulations("costs"))
     except (StepError, ProblemError) as error:
-        return {}, None, str(error)
+        return {}, None, str(error), []
+    return plans, problem, "", [f"left out, for lack of time: {', '.join(late)}"] * bool(late)
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -257,7 +285,8 @@ def _published_row(problem: Problem, plans: Iterable[Plan]) -> dict[str, object]
     loop = graph_of(problem, Aim.SUM)
     (value,) = plan_values(loop, published_plan(problem.scene))
     alike = (p for p in plans if (p.method, p.goals) == (loop.method, loop.names))
-    bound = max(p.certificate.bound for p in alike if p.certificate is not None)
+    bounds = (p.certificate.bound for p in alike if p.certificate is not None)
+    bound = max(bounds, default=np.nan)  # nothing is proven for lack of time
     gap = (value - bound) / (abs(value) or 1.0)
     return {"problem": problem.method, "objective": value, "gap": gap}
 
@@ -327,7 +356,7 @@ def _free_plan(
     criterion: Criterion,
     fixed: Sequence[Mapping[str, float]],
     robots: Sequence[str],
-    progress: Tell,
+    run: Run,
 ) -> tuple[Plan | None, list[str]]:
     """Return the shortest free schedule with the smallest worst step, or why there is none.
 
@@ -343,7 +372,7 @@ def _free_plan(
         criterion = WorstRatio("worst-ratio-to-rows", tuple(limits))
     try:
         problem = pose(engine, FreeRules(robots=tuple(robots)), criterion, "minmax,steps")
-        plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
+        plan = _solve_run(problem, "schedule_search", run)
     except SeqoptError as error:
         return None, [f"{FREE}: {error}"]
     return on_the_way(plan), []
@@ -454,7 +483,7 @@ def _rows(
     def plainness(name: str) -> tuple[bool, bool, str]:
         if (own := found.get(name)) is None:
             return False, False, name
-        return own.kind is not FormulationKind.EXACT, own.takes_budgets, name
+        return own.kind.value != "exact", own.takes_budgets, name
 
     for problem, rows in table.groupby("problem", sort=False):
         yield TITLES.get(str(problem), f"{problem} loop, grips chosen by a formulation")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,44 +12,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import NullLocator
 
-from seqopt.report._regret._table import (
-    CUT,
-    DONE,
-    FAILED,
-    FALLS,
-    NAMED,
-    USUAL_NAMES,
-    RegretTable,
-    percent,
-    seconds_text,
-)
-from seqopt.report._style import (
-    GRAY,
-    GREEN,
-    INK,
-    SMALL,
-    WIDTH,
-    dress,
-    look,
-    name_panels,
-    new_figure,
-    plain,
-    styled,
-)
+from seqopt.arrays import Floats
+from seqopt.graph.formulation import Finding
+from seqopt.report._regret._table import LOST, PARTS, RegretTable, _short, percent, seconds_text
+from seqopt.report._style import GREEN, INK, SMALL, WIDTH, dress, look, new_figure, plain, styled
 from seqopt.sequence.rules import FREE
 
 ENGINES = ("compliance", "rigid grips", "frame", "discrete")  # in the order of their looks
-MARKS = {"loop": "o", FREE: "s"}
+MARKS = {"loop": ("o", "the loop"), FREE: ("s", "the free schedule")}
 PALE = 0.28
-LEAST = 1e-6  # regret from which on the axis is logarithmic; less is drawn in the band of none
-NONE = LEAST / 6
+LEAST = 1e-6  # what is less is drawn in the band of none
+MOST = 1e-3  # from which on an axis is logarithmic, unless regrets are less
 LINE = 24  # letters of a line beside a point
-SPOT = (-12, 9)  # points, from a point to its words
+ABOVE, BELOW = ((-12, 9), "baseline"), ((-4, -8), "top")  # points, from a point to its words
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 LETTER = 0.072  # inches of a letter of a title
-PARTS = {"regret": "D", "gap": "|", "error": "x"}  # and their marks
-LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
+FEW_TICKS = 6
+INCUMBENT: dict[str, Any] = {"lw": 0.7, "ls": "-"}  # over time
+BOUND: dict[str, Any] = {"lw": 0.9, "ls": ":"}
 
 
 @styled
@@ -57,14 +39,10 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     """Return the chart of one scene, with the parts of regret, or of several side by side."""
     across = 1 if width < WIDTH or len(tables) == 1 else 2
     if len(tables) == 1:
-        whole = tables[0].table  # drawn are ways that are not dominated, or usual, the best last
-        own = whole[tables[0].kept | whole["formulation"].isin(USUAL_NAMES)]
-        own = own[np.isfinite(own["regret"].to_numpy(float))]
-        parts: pd.DataFrame = own.sort_values(["regret", "seconds"])[::-1]
-        heights = [4.4, 0.6 + 0.28 * len(parts)]
+        heights = [4.4, 0.6 + 0.36 * len(tables[0].alike)]
         figure = new_figure(0.7 + sum(heights), width)
         panels = figure.subplots(2, 1, height_ratios=heights)
-        _draw_parts(panels[1], parts)
+        _draw_parts(panels[1], tables[0].alike)
         dress(panels[1])
     else:
         rows = -(-len(tables) // across)
@@ -72,121 +50,114 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
         panels = figure.subplots(rows, across, squeeze=False).ravel()
         for axes in panels[len(tables) :]:
             axes.set_visible(False)
-    for axes, each in zip(panels, tables, strict=False):
+    for letter, axes, each in zip("abcdefgh", panels, tables, strict=False):
         _regrets(axes, each)
         took = each.take
-        words = f"take {took['engine']}, {_words(took)}: {seconds_text(took['seconds'])}"
-        valued = f", valued by {each.valued}" if len(tables) == 1 else ""
-        lines = [f"{each.scene}, {each.bricks} bricks{valued}", words]
+        words = f"take {took['engine']}, {_short(took)}: {seconds_text(took['seconds'])}"
+        begin, end = (f"({letter}) ", "") if tables[1:] else ("", f", valued by {each.valued}")
+        lines = [f"{begin}{each.scene}, {each.bricks} bricks{end}", words.replace("_", " ")]
         most = int((width / across - 0.6) / LETTER)
-        title = "\n".join(textwrap.fill(line, most) for line in lines)
-        axes.set_title(title, fontsize=SMALL)
-    shown = panels[: len(tables)]
-    dress(*shown)
-    if len(tables) > 1:
-        name_panels(*shown)
+        axes.set_title("\n".join(textwrap.fill(line, most) for line in lines), fontsize=SMALL)
+        lost = each.table[~np.isfinite(each.table["regret"].to_numpy(float))]
+        counts = lost.groupby(["engine", "status"], sort=False).size().to_dict().items()
+        lines = [f"{engine} {count} {LOST[status]}" for (engine, status), count in counts]
+        without = textwrap.fill("no point: " * bool(lines) + ", ".join(lines), most - 6)
+        axes.set_xlabel(f"time from scene to plan [s]\n{without}".strip(), fontsize=SMALL)
+        dress(axes)
     _legend(figure, tables, 2 if width < WIDTH else 4)
     return figure
 
 
-def _words(row: pd.Series[float]) -> str:
-    words = str(row["formulation"]).replace("_", " ")
-    return f"{words}, {row['without']}" if row["without"] else words
-
-
 def _look(engine: str, schedule: str, *, filled: bool = True) -> dict[str, Any]:
     known = ENGINES.index(engine) if engine in ENGINES else len(ENGINES)
-    return look(known).mark(filled=filled) | {"marker": MARKS[schedule]}
-
-
-def _height(regret: float) -> float:
-    return regret if regret >= LEAST else NONE
+    return look(known).mark(filled=filled) | {"marker": MARKS[schedule][0]}
 
 
 def _regrets(axes: Axes, table: RegretTable) -> None:
     """Draw regret over time, with words for each way that is not dominated."""
     seen = table.table.assign(kept=table.kept)
-    seen = seen[np.isfinite(seen["regret"].to_numpy(float))].sort_values(
-        ["kept", "seconds"], ascending=[True, False]
-    )
-    for name, row in seen.iterrows():
-        kept, at = bool(row["kept"]), (float(row["seconds"]), _height(float(row["regret"])))
+    seen = seen[np.isfinite(seen["regret"].to_numpy(float))]
+    for name, row in seen.sort_values(["kept", "seconds"], ascending=[True, False]).iterrows():
+        at = float(row["seconds"]), float(row["regret"])
         mark = _look(str(row["engine"]), str(row["schedule"]), filled=bool(row["exact"]))
-        how: dict[str, Any] = {"ms": 6.5, "zorder": 3} if kept else {"ms": 5.0, "alpha": PALE}
-        axes.plot(*at, clip_on=False, **mark, **how)
+        mark |= {"ms": 6.5, "zorder": 4} if row["kept"] else {"ms": 5.0, "alpha": PALE, "zorder": 3}
+        axes.plot(*at, clip_on=False, **mark)
         if name == table.take.name:
-            ring: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": INK, "mew": 1.1, "zorder": 4}
+            ring: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": INK, "mew": 1.1, "zorder": 5}
             axes.plot(*at, "o", clip_on=False, **ring)
-    kept = seen[seen["kept"]][::-1]  # no way lies below these steps
-    steps: dict[str, Any] = {"color": INK, "lw": 0.8, "drawstyle": "steps-post", "zorder": 1}
-    axes.plot(kept["seconds"], kept["regret"].cummin().map(_height), **steps)
+    kept = seen[seen["kept"]].sort_values("seconds")
+    least = kept["regret"].cummin()  # no way lies below these steps
+    axes.plot(kept["seconds"], least, color=INK, lw=0.8, drawstyle="steps-post", zorder=1)
     _draw_curves(axes, table)
-    _scales(axes, table, seen)
+    times = seen["seconds"]
+    axes.set(xscale="log", xlim=(float(times.min()) / 2.2, 3.0 * float(times.max())))
+    plain(axes.xaxis)
+    _scale(axes, "y", seen["regret"].to_numpy(float), "proven 0" if table.is_proven else "0")
+    axes.set_ylabel("regret")
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "linespacing": 1.0}
-    front = kept[kept["regret"] <= kept["regret"].cummin()]
-    near = (2 * np.log10(front["regret"].map(_height))).round()  # whose words would overlap
-    for _, row in front[~near.duplicated()].iterrows():
+    for _, row in table.front.iterrows():
         engine = f"{row['engine']}: " * (row["engine"] != table.reference)
-        words = textwrap.fill(engine + _words(row), LINE)
-        at = float(row["seconds"]), _height(float(row["regret"]))
-        text = axes.annotate(words, at, SPOT, path_effects=HALO, zorder=5, **beside)
+        words = textwrap.fill(engine + _short(row).replace("_", " "), LINE)
+        at = float(row["seconds"]), float(row["regret"])
+        spot, va = BELOW if row["regret"] > LEAST and at[0] > kept["seconds"].min() else ABOVE
+        text = axes.annotate(words, at, spot, va=va, path_effects=HALO, zorder=2, **beside)
         text.set_in_layout(False)
 
 
 def _draw_curves(axes: Axes, table: RegretTable) -> None:
-    """Draw incumbents of ways with the reference over time, and dotted what bounds leave open."""
+    """Draw incumbents of ways with the reference over time, and dotted how far bounds are below."""
     best = float(table.table["value"].min()) or 1.0
-    for (_, row), found in zip(table.table.iterrows(), table.curves, strict=False):
-        own = row["engine"] == table.reference and not row["without"]
-        if not own or len(found) < 2 or not np.isfinite(float(row["regret"])):
-            continue
+    for row, found in _drawn(table):
         start = max(float(row["seconds"]) - found[-1].seconds, 0.0)
         seconds = [start + each.seconds for each in found]
         color = _look(str(row["engine"]), str(row["schedule"]))["color"]
-        how: dict[str, Any] = {"color": color, "lw": 0.7, "alpha": 0.6, "zorder": 1}
-        above = [each.objective / best - 1.0 for each in found]
-        below = [1.0 - each.bound / best for each in found]
-        for shares, line in ((above, "-"), (below, ":")):
-            known = [_height(each) if np.isfinite(each) else np.nan for each in shares]
-            axes.plot(seconds, known, line, drawstyle="steps-post", **how)
+        how: dict[str, Any] = {"color": color, "alpha": 0.6, "drawstyle": "steps-post", "zorder": 1}
+        above = np.array([each.objective for each in found]) / best - 1.0
+        below = 1.0 - np.array([each.bound for each in found]) / best  # a loop's may be above
+        for shares, line in ((above, INCUMBENT), (below, BOUND)):
+            known = (shares > -LEAST) & np.isfinite(shares)
+            axes.plot(seconds, np.where(known, shares, np.nan), **how | line)
+
+
+def _drawn(table: RegretTable) -> Iterator[tuple[pd.Series[float], Sequence[Finding]]]:
+    """Yield the ways with the reference that told several incumbents or bounds, and these."""
+    for (_, row), found in zip(table.table.iterrows(), table.curves, strict=False):
+        own = row["engine"] == table.reference and not row["without"]
+        if own and len(found) > 1 and np.isfinite(float(row["regret"])):
+            yield row, found
 
 
 def _draw_parts(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw regret, proven gap and error of the model, a line for each way."""
-    most = 100 * LEAST
+    """Draw regret, proven gap and error of the model, a line for each way, its name above it."""
     for line, (_, row) in enumerate(rows.iterrows()):
-        for name, marker in PARTS.items():
-            value = float(row[name])
-            if np.isfinite(value):
-                most = max(most, value)
-                mark = _look(str(row["engine"]), str(row["schedule"]), filled=name == "regret")
-                axes.plot(_height(value), line, clip_on=False, ms=6, **mark | {"marker": marker})
-    lines = [f"{row['engine']}, {row['schedule']}: {_words(row)}" for _, row in rows.iterrows()]
-    axes.set_yticks(range(len(rows)), lines, fontsize=SMALL)
-    axes.set(xscale="log", xlim=(NONE / 3, 4 * most), ylim=(-0.6, len(rows) - 0.4))
-    ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1, 2)]
-    axes.set_xticks([NONE, *ticks], ["0", *map(percent, ticks)])
-    axes.set_xticks([], minor=True)
+        for name, (marker, _) in PARTS.items():
+            mark = _look(str(row["engine"]), str(row["schedule"]), filled=name == "regret")
+            mark |= {"marker": marker, "ms": 6 if name == "regret" else 12}
+            axes.plot(row[name] if np.isfinite(row[name]) else np.nan, line, clip_on=False, **mark)
+        more = f" and {row['ways'] - 1} more" * (row["ways"] > 1)
+        words = f"{row['engine']}, {row['schedule']}: {_short(row).replace('_', ' ')}{more}"
+        place: Any = {"transform": axes.get_yaxis_transform(), "path_effects": HALO}
+        axes.text(0.01, line + 0.28, words, fontsize=SMALL, **place)
+    axes.set_yticks(range(len(rows)), [])
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(-0.5, len(rows) - 0.2)
+    _scale(axes, "x", rows[[*PARTS]].to_numpy(float).ravel(), "0")
     axes.set(xlabel="share of the worst step", title="what regret is made of, way by way")
-    axes.axvspan(NONE / 3, 0.5 * LEAST, color=GREEN, alpha=0.13, lw=0, zorder=0)
 
 
-def _scales(axes: Axes, table: RegretTable, seen: pd.DataFrame) -> None:
-    """Give axes their limits, a band of no regret, and the number of ways without a point."""
-    times, most = seen["seconds"], max(float(seen["regret"].max()), 100 * LEAST)
-    axes.set(xscale="log", yscale="log", xlim=(float(times.min()) / 2.2, 3.0 * float(times.max())))
-    axes.set(ylim=(NONE / 3, 60 * most), xlabel="time from scene to plan [s]", ylabel="regret")
-    plain(axes.xaxis)
-    ticks = [10.0**power for power in range(-6, int(np.ceil(np.log10(most))) + 1)]
-    axes.set_yticks([NONE, *ticks], ["proven 0" if table.is_proven else "0", *map(percent, ticks)])
-    axes.set_yticks([], minor=True)
-    axes.axhspan(NONE / 3, 0.5 * LEAST, color=GREEN, alpha=0.13, lw=0, zorder=0)
-    lost = table.table[~np.isfinite(table.table["regret"].to_numpy(float))]
-    for line, ((engine, status), own) in enumerate(lost.groupby(["engine", "status"], sort=False)):
-        words = f"{engine}: {len(own)} way{'s' * (len(own) > 1)} {LOST[str(status)]}"
-        spot: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "top"}
-        text = axes.annotate(words, (0.995, 0.99 - 0.07 * line), fontsize=SMALL, color=GRAY, **spot)
-        text.set_in_layout(False)
+def _scale(axes: Axes, name: str, shares: Floats, zero: str) -> None:
+    """Give an axis of shares decades from that of the least one on, and a colored band of none."""
+    shown = shares[np.isfinite(shares) & (shares > LEAST)]
+    low = np.floor(np.log10(shown.min(initial=MOST)))
+    high = max(float(shown.max(initial=0.0)), 10.0 ** (low + 2))
+    powers = np.arange(low, np.ceil(np.log10(high)) + 1)
+    ticks = 10.0 ** (powers[1::2] if name == "x" and len(powers) > FEW_TICKS else powers)
+    getattr(axes, f"set_{name}scale")("symlog", linthresh=10.0**low, linscale=0.6)
+    axes.set(**{f"{name}lim": (-(10.0**low), 10.0 * high)})
+    axis, span = getattr(axes, f"{name}axis"), axes.axvspan if name == "x" else axes.axhspan
+    axis.set_ticks([0.0, *ticks], labels=[zero, *map(percent, ticks)])
+    axis.set_minor_locator(NullLocator())
+    span(-(10.0**low), 0.6 * 10.0**low, color=GREEN, alpha=0.13, lw=0, zorder=0)
 
 
 def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
@@ -194,14 +165,16 @@ def _legend(figure: Figure, tables: Sequence[RegretTable], across: int) -> None:
     present = dict.fromkeys(str(name) for each in tables for name in each.table["engine"])
     marks = [Line2D([], [], label=name, **_look(name, FREE) | {"marker": "o"}) for name in present]
     mark: dict[str, Any] = {"ls": "none", "color": INK}
-    marks += [Line2D([], [], **mark, marker=MARKS[kind], label=NAMED[kind]) for kind in MARKS]
+    marks += [Line2D([], [], **mark, marker=m, label=words) for m, words in MARKS.values()]
     marks += [
         Line2D([], [], **mark, marker="o", mfc="white", label="not proven"),
         Line2D([], [], **mark, marker="o", alpha=PALE, label="dominated"),
         Line2D([], [], color=INK, lw=0.8, label="frontier"),
         Line2D([], [], **mark, marker="o", mfc="none", ms=11, label="take this"),
     ]
+    if any(True for each in tables for _ in _drawn(each)):
+        curves = (INCUMBENT, "incumbent"), (BOUND, "bound, below the best")
+        marks += [Line2D([], [], color=INK, **line, label=words) for line, words in curves]
     if len(tables) == 1:
-        words = {"regret": "regret", "gap": "proven gap", "error": "error of the model"}
-        marks += [Line2D([], [], **mark, marker=each, label=words[n]) for n, each in PARTS.items()]
+        marks += [Line2D([], [], **mark, marker=m, label=words) for m, words in PARTS.values()]
     figure.legend(handles=marks, loc="outside lower center", ncols=across)

@@ -10,11 +10,10 @@ model that the scene has data for,
 
 So what a search missed and what a model got wrong are one number, as a builder meets them. The end
 counts for all: a loop leaves its robots where they are, and what then bears itself is asked of it
-as of a free schedule. Beside it stand its parts: the *gap* of the plan to the bound that the way
-proves, in its own model, and the *error* of the worst step that its own model promised.
+as of a free schedule. Its parts are the *gap* of the plan to the bound that the way proves, in its
+own model, and the *error* of the worst step that its own model promised.
 
-All ways share the time limit: one that needs less leaves more to those after it. Each is
-repeated up to `TIMES` times where that takes little; the least time counts.
+All ways share the time limit. Each is repeated up to `TIMES` times where that takes little.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -33,21 +32,21 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.engines.registry import USUAL as USUAL_ENGINE
 from seqopt.errors import MechanismError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
-from seqopt.graph.formulation import End, Finding, FormulationKind, find_formulation, formulations
+from seqopt.graph.formulation import End, Finding, FormulationKind, Run, formulations
 from seqopt.judge._schedules import plan_values
 from seqopt.network.network import build_network
 from seqopt.plan.plan import Plan
-from seqopt.plan.solve import graph_of, on_the_way, pose, solve
+from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable
+from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, NOTHING, RegretTable
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._steps import step_verdicts
 from seqopt.stability.verdict import Verdict
-from seqopt.work import Stage, Tell, _ending
+from seqopt.work import GRACE, Clock, Stage, Tell, _ending
 
 TIMES = 3
 SHARE = 4  # times its part of what is left that a way may take
@@ -59,11 +58,10 @@ USUAL_RULES = FreeRules()
 NEAR = "near:6"
 FEW = ("cascade", "path_beam", "schedule_search")  # formulations that need not look at all
 SLOW = ("frame", "discrete")  # engines that come last
-KEPT = 0.7  # share of its time after which what can return its best plan so far does
-NOTHING = 1e-9  # regrets and errors below are none
+KEPT, ALL = 0.7, 0.95  # shares of its time after which a search, and a proof, ends
 Found = TypeVar("Found")
-Valued: TypeAlias = tuple[float, float, str, str]
-"""The worst step of a plan and its end, that of its own steps, its status, and why it falls."""
+Row: TypeAlias = tuple[dict[str, object], Sequence[Finding]]  # with incumbents and bounds
+Valued: TypeAlias = tuple[float, float, str, str]  # with the end, without, status, why it falls
 
 
 @dataclass(frozen=True)
@@ -96,11 +94,9 @@ WALL = Timer()
 
 @dataclass(frozen=True)
 class Way:
-    """One way to a plan.
+    """One way to a plan; what it leaves out, or adds, is the last word.
 
-    ``engine``: a name, or `RIGID_GRIPS`; ``schedule``: `LOOP` or `FREE`; ``without``: what it
-    leaves out, or adds: ``no proof``, ``near:6`` (candidates), ``ranks`` (the objective) or
-    ``stands`` (states proven to stand).
+    That is ``no proof``, ``near:6``, ``ranks`` or ``stands`` (states are proven to stand).
     """
 
     engine: str
@@ -124,7 +120,6 @@ class _Course:
     rules: FreeRules
     mortar: Mortar | None
     timer: Timer
-    findings: list[Finding] = field(default_factory=list)
     known: dict[Sequence[Step], Valued] = field(default_factory=dict)
 
     def engine(self, name: str) -> Engine:
@@ -149,31 +144,29 @@ class _Course:
 
     def _schedule(self, engine: Engine, near: str) -> Schedule:
         assert self.loop is not None  # else no way asks for it
-        found = (
-            find_schedule(engine.network) if engine.network.scene != self.loop.scene else self.loop
-        )
+        other = engine.network.scene != self.loop.scene
+        found = find_schedule(engine.network) if other else self.loop
         return thin(found, near) if near else found
 
-    def row(self, way: Way, seconds: float) -> dict[str, object]:
+    def row(self, way: Way, seconds: float) -> Row:
         """Return the row of a way, which may take so long."""
+        seconds = max(seconds, 0.0)  # of none nothing begins
         proof, found = way.without != "no proof", list[Finding]()
 
         def call() -> Plan:
             found.clear()
-            how: dict[str, Any] = {"proof": proof, "progress": found.append}
-            if "seconds" in find_formulation(way.formulation).options:
-                how["time_limit"] = KEPT * seconds
-            return on_the_way(solve(self.problem(way), way.formulation, **how))
+            clock = Clock(max(KEPT * seconds, ALL * seconds - GRACE))  # of search and proof
+            run = Run(KEPT * seconds, found.append, proof, clock=clock)
+            return on_the_way(_solve_run(self.problem(way), way.formulation, run))
 
         about = {"engine": way.engine, "schedule": way.schedule, "formulation": way.formulation}
         row = {**about, "without": way.without, "exact": False, "models": 0, "why": ""}
         row |= dict.fromkeys(("seconds", "value", "own", "gap", "error"), np.nan)
         try:
-            took, plan = self.timer.least(max(seconds, 1e-3), call)
+            took, plan = self.timer.least(seconds, call)
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
-            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}
-        self.findings[:] = [each for each in found if isinstance(each, Finding)]
+            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}, ()
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]
@@ -184,7 +177,22 @@ class _Course:
         exact = gap == 0 and way.without not in (NEAR, "ranks")
         row |= {"seconds": took, "value": value, "gap": gap, "exact": exact}
         row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
-        return row | {"models": plan.models, "status": status, "why": why}
+        row |= {"models": plan.models, "status": status, "why": why}
+        return row, [each for each in found if isinstance(each, Finding)]
+
+    def rows(self, ways: Sequence[Way], seconds: float, progress: Tell) -> Iterator[Row]:
+        """Yield the rows of ways, which share the time."""
+        late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
+        end = self.timer.now() + seconds
+        for done, way in enumerate(ways):
+            progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
+            left, others = end - self.timer.now(), len(ways) - done
+            most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
+            skips = (way.engine, way.schedule) in late and way.formulation not in FEW
+            row, found = self.row(way, 0.0 if skips else max(left / others, most))
+            if row["status"] == CUT and way.formulation not in FEW:
+                late.add((way.engine, way.schedule))
+            yield row, found
 
     def _value(self, steps: Sequence[Step]) -> Valued:
         """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
@@ -213,43 +221,22 @@ def measure_regret(
     rules: FreeRules = USUAL_RULES,
     seconds: float = 60.0,
     reference: str = "",
+    mortar: Mortar | None = None,
     progress: Tell = lambda _: None,
     timer: Timer = WALL,
 ) -> RegretTable:
     """Return the cost of every way's plan in the most detailed model of a scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        Has the scene; its mortar says where joints may open.
-    criterion : Criterion
-        The cost of a step, of which the largest counts. Of one that ranks candidates the sum is an
-        objective of the loop, and the worst ratio counts.
-    rules : FreeRules, optional
-        Of the free schedule.
-    seconds : float, optional
-        For all ways together, s.
-    reference : str, optional
-        The engine that values plans; by default ``compliance``, with the stiffness of grips that
-        the scene has. Where the engine has a mortar, every step has to stand with it, too, which
-        is proven by its joints' equilibrium; ``discrete`` lets these open and slip instead.
-    progress, timer : callable, Timer, optional
-        Called with the progress.
-
-    Returns
-    -------
-    RegretTable
-
-    Raises
-    ------
-    ProblemError
-        If there is no such reference, or no way finds a plan that stands in it.
+    Of a criterion that ranks candidates the worst ratio counts; the sum is an objective of the
+    loop. ``mortar``: with which every step is proven to stand, by default that of the engine; with
+    a ``reference`` that is ``discrete`` joints open and slip instead. Raises `ProblemError` if
+    there is no such reference, `NothingFoundError` if no way finds a plan that stands in it.
     """
     start = timer.now()
     check_reference(reference)
     recipe, named = recipe_of(engine), engine
     joints = None if recipe is None else dict(recipe.options).get("mortar")
-    mortar = joints if isinstance(joints, Mortar) else None
+    mortar = mortar or (joints if isinstance(joints, Mortar) else None)
     if reference or recipe is not None:  # else an object of one's own
         own = mortar if reference in LIMITED else None
         named = make_engine(reference or USUAL_ENGINE, engine.network, own)
@@ -259,19 +246,9 @@ def measure_regret(
     with suppress(SeqoptError):
         loop = find_schedule(engine.network)
     course = _Course(problem, criterion, loop, rules, mortar, timer)
-    name, rows, curves = _name_of(named), list[dict[str, object]](), list[Sequence[Finding]]()
+    name = _name_of(named)
     ways, refused = _ways(course, name)
-    late = set[tuple[str, str]]()  # engines and schedules that need too long to look at all
-    for done, way in enumerate(ways):
-        progress(Stage(f"regret: {way.engine}, {way.schedule}", done / len(ways)))
-        left, others = seconds - (timer.now() - start), len(ways) - done
-        most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
-        course.findings.clear()
-        skips = (way.engine, way.schedule) in late and way.formulation not in FEW
-        rows.append(course.row(way, 0.0 if skips else max(left / others, most)))
-        if rows[-1]["status"] == CUT and way.formulation not in FEW:
-            late.add((way.engine, way.schedule))
-        curves.append(tuple(course.findings))
+    rows, curves = zip(*course.rows(ways, seconds - timer.now() + start, progress), strict=True)
     table = pd.DataFrame(rows)
     best = table["value"].min()
     regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
@@ -279,7 +256,8 @@ def measure_regret(
     table = table.assign(regret=regret, error=error)
     if not np.isfinite(best):
         why = next((f": {row['engine']}, {row['why']}" for row in rows if row["why"]), "")
-        raise NothingFoundError(f"regret: no plan holds in the reference{why}; give more seconds")
+        more = "; give more seconds" * bool((table["status"] == CUT).any())
+        raise NothingFoundError(f"regret: no plan holds in the reference{why}{more}")
     scene = engine.network.scene
     soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
     stands = ", where every step stands" * (mortar is not None and name != "discrete")

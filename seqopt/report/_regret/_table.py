@@ -21,9 +21,16 @@ if TYPE_CHECKING:
 
 DONE, CUT, FAILED, FALLS = "done", "stopped", "failed", "falls"
 COLUMNS = 80  # of a terminal
+NOTHING = 1e-9  # regrets and errors below are none
 MANY = 4  # ways that are counted, not named, where they fail alike
 SAME = 1.1  # times that differ by less are equal: repetitions do
+LOST = {CUT: "stopped", FAILED: "without a plan", FALLS: "fall", DONE: "not allowed"}
 OF = {"regret": "", "gap": " to its bound", "error": " of its model"}
+PARTS = {
+    "regret": ("D", "regret"),
+    "gap": ("|", "proven gap"),
+    "error": ("x", "error of the model"),
+}
 USUAL_NAMES = ("overlap_dp", "schedule_search")
 NAMED = {FREE: "the free schedule", "loop": "the loop"}
 
@@ -31,9 +38,8 @@ NAMED = {FREE: "the free schedule", "loop": "the loop"}
 def dominated(table: pd.DataFrame) -> Bools:
     """Return which rows are dominated: another is as good in everything, and better in something.
 
-    ``table``: with ``seconds``, ``regret`` and ``exact``: what proves its plan is not dominated by
-    what does not. A row without a plan that holds is dominated. Times count as equal where they
-    differ by less than `SAME`, so that noise decides nothing.
+    What proves its plan (``exact``) is not dominated by what does not; a row without a plan that
+    holds is. Times that differ by less than `SAME` are equal, so that noise decides nothing.
     """
     known = np.isfinite(table[["seconds", "regret"]].to_numpy(float)).all(axis=1)
     seconds, proves = table["seconds"].to_numpy(float), table["exact"].to_numpy(bool)
@@ -46,19 +52,26 @@ def dominated(table: pd.DataFrame) -> Bools:
     return np.asarray(beats.any(axis=0) | ~known)
 
 
+def apart(shares: pd.Series[float]) -> Bools:
+    """Return which shares differ by more than half a decade from those kept before."""
+    logs, kept = np.log10(shares.clip(lower=NOTHING).to_numpy()), list[int]()
+    for i, each in enumerate(logs):
+        kept += [i] * bool((np.abs(logs[kept] - each) > 0.5).all())
+    return np.isin(np.arange(len(logs)), kept)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RegretTable:
     """What the plans of all ways cost in the most detailed model of one scene.
 
     ``reference``: the engine that values plans, and ``valued`` with what it takes into account;
-    ``worst``: the criterion whose largest value of any step counts; ``limit``: of all ways
-    together, s; ``table``: a row per ``engine``, ``schedule``, ``formulation`` and what is left out
+    ``worst``: the criterion whose largest value counts; ``limit``: of all ways together, s;
+    ``table``: a row per ``engine``, ``schedule``, ``formulation`` and what it leaves out
     (``without``), with the ``seconds`` from scene to plan, its ``value`` in the reference and in
-    its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves
-    and the ``error`` of what its model promised; whether it proves its plan (``exact``), the
-    ``models`` that it solved, its ``status``, and ``why`` there is no plan, or none that holds;
-    ``refused``: engines that cannot model the scene, and why; ``curves``: incumbents and bounds
-    over time, row by row.
+    its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves,
+    the ``error`` of what its model promised, whether it proves its plan (``exact``), ``models``
+    solved, its ``status``, and ``why`` there is no plan, or none that holds; ``refused``: engines
+    that cannot model the scene, and why; ``curves``: incumbents and bounds over time, row by row.
     """
 
     scene: str
@@ -87,8 +100,28 @@ class RegretTable:
 
     @cached_property
     def kept(self) -> Bools:
-        """Which rows no other one beats."""
-        return ~dominated(self.table)
+        """Which rows no other one beats; a proof counts in the model that values plans."""
+        proves = self.table["exact"] & (self.table["engine"] == self.reference)
+        return ~dominated(self.table.assign(exact=proves))
+
+    @property
+    def front(self) -> pd.DataFrame:
+        """The rows that are worth a name, those near each other once, the one to take first."""
+        kept = self.table[self.kept].sort_values("seconds")
+        kept = kept[kept["regret"] <= kept["regret"].cummin()]
+        kept = kept.sort_index(key=lambda names: names != self.take.name, kind="stable")
+        return kept[apart(kept["regret"])]
+
+    @property
+    def alike(self) -> pd.DataFrame:
+        """A row for the ways whose regret has the same parts, and how many; the best last."""
+        own = self.table[np.isfinite(self.table["regret"].to_numpy(float))]
+        own = own.assign(other=~own["formulation"].isin(USUAL_NAMES) | (own["without"] != ""))
+        own = own.sort_values(["regret", "other", "seconds"])
+        by = [own["engine"], own["schedule"], *(own[part].map(percent) for part in PARTS)]
+        alike = own.groupby(by, sort=False)
+        found: pd.DataFrame = alike.head(1).assign(ways=alike["regret"].size().to_numpy())[::-1]
+        return found
 
     @cached_property
     def is_proven(self) -> bool:
@@ -98,11 +131,9 @@ class RegretTable:
 
     @cached_property
     def take(self) -> pd.Series[float]:
-        """The row to take: of the least regret, one that proves its plan if any does, the soonest.
-
-        Of those that are equally soon one of the reference, and the usual formulation.
-        """
-        best = self.table[self.kept & (self.table["status"] == DONE)]
+        """The row to take: of least regret, proven if any is, soonest, of the reference, usual."""
+        done = self.kept & (self.table["status"] == DONE)
+        best = self.table[done if done.any() else self.kept]  # all that have a plan were stopped
         best = best[best["regret"] == best["regret"].min()]
         best = best[best["exact"] == best["exact"].max()]
         best = best[best["seconds"] <= SAME * best["seconds"].min()]
@@ -125,11 +156,11 @@ class RegretTable:
 
     @cached_property
     def sooner(self) -> pd.DataFrame:
-        """The rows that take less time than the one to take: worse ones, or one without a proof."""
+        """The rows that are sooner than the one to take, `apart`: worse, or without a proof."""
         soon = self.table[self.kept & (self.table["seconds"] * SAME < self.take["seconds"])]
         worse = soon[soon["regret"] > self.take["regret"]]
-        found = soon if worse.empty else worse
-        return found.sort_values("regret").drop_duplicates("regret")
+        found = (soon if worse.empty else worse).sort_values("seconds")
+        return found[apart(found["regret"])].sort_values("regret")
 
     @property
     def sentence(self) -> str:
@@ -168,7 +199,7 @@ class RegretTable:
         yield from _wrapped(
             f"Regret: what the worst step ({self.worst}) takes, valued by {self.valued}, above "
             f"that {zero}. Gap: to the bound that a way proves in its own model. Error: of the "
-            f"worst step that it promised. All ways had {self.limit:g} s."
+            f"worst step that it promised. All ways had {seconds_text(self.limit)}."
         )
         yield f"{'':41}{'seconds':>9}{'regret':>10}{'gap':>10}{'error':>10}"
         for (engine, schedule), own in self.table.groupby(["engine", "schedule"], sort=False):
