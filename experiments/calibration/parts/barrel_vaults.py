@@ -216,14 +216,9 @@ def median_scale(share: Floats) -> Floats:
     return np.asarray(1 / np.take_along_axis(share, rows, axis=0)[0])
 
 
-def square_scale(share: Floats) -> Floats:
-    """Return the factor per column that minimizes the sum of ``(factor * share - 1)²``."""
-    return np.asarray(share.sum(axis=0) / (share**2).sum(axis=0))
-
-
 MEASURES: dict[str, tuple[Callable[[Floats], Floats], int]] = {
     "absolute": (median_scale, 1),
-    "squares": (square_scale, 2),
+    "squares": (lambda share: np.asarray(share.sum(axis=0) / (share**2).sum(axis=0)), 2),
 }  # best factor, and the power of the errors that are summed
 
 

@@ -127,9 +127,8 @@ def one_left(size: Size, rng: Rng) -> Costs:
 def dead_end(size: Size, rng: Rng) -> Costs:
     """Return a problem whose candidates are all allowed, but no pair of the last two moves is."""
     sums = whole(size.sizes, rng).sums
-    return Costs(
-        LayeredCosts(sums.single, (*sums.shared[:-1], np.full_like(sums.shared[-1], np.inf)))
-    )
+    none = np.full_like(sums.shared[-1], np.inf)
+    return Costs(LayeredCosts(sums.single, (*sums.shared[:-1], none)))
 
 
 def altered(size: Size, rng: Rng, value: float) -> Costs:
