@@ -38,6 +38,7 @@ MARKERS = "sD^vP*"
 IN_A_ROW = 2  # charts
 LEAST = 0.01  # share of its numbers that an axis spans at least
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
+FAR_APART, WORDY = 100, 60  # values make an axis logarithmic; letters that are too many for a line
 VERDICTS = {
     "not a step": "#ffffff",
     Verdict.STANDS.value: SKY,
@@ -119,31 +120,36 @@ def front_figure(
 
 
 def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
-    """Draw the first goal over the first name, a line for every value of a second one.
+    """Draw the first goal over the first name, a line for all values of the others.
 
-    Problems without a plan are crosses. ``table``: of `seqopt.sweep`; ``names``: its columns
-    of what differs.
+    Problems without a plan are crosses. Of ``names``, a scene stands for its words that differ.
     """
-    first, second = (*names, "")[:2]
     goal = next(c.removesuffix("_bound") for c in table.columns if c.endswith("_bound"))
-    figure = new_figure(3.4)
-    axes = figure.subplots()
+    if "scene" in names and len(table["scene"].str.partition(":")[0].unique()) == 1:
+        pairs = table["scene"].str.findall(r"([^:,=]+)=([^,]*)").map(dict)
+        own = pd.DataFrame([*pairs], table.index).fillna("")
+        table = own.join(table.drop(columns=own.columns, errors="ignore"))
+        names = [*own.columns[own.ne(own.iloc[0]).any()], *(n for n in names if n != "scene")]
+    first, *others = names
+    axes = (figure := new_figure(3.4)).subplots()
     numbers = pd.to_numeric(table[first], errors="coerce")
     named = numbers.isna().any()  # then values stand one beside the other
     place = pd.Series(pd.factorize(table[first])[0] if named else numbers, table.index, float)
-    groups = {"": table} if not second else {f"{second} {v}": t for v, t in table.groupby(second)}
-    for label, look in looks(groups).items():
-        own = groups[label]
+    values = [", ".join(f"{n} {row[n]}" for n in others) for row in table.to_dict("records")]
+    for label, look in looks(values).items():
+        own = table[np.array(values) == label]
         axes.plot(place[own.index], own[goal].astype(float), label=label, **look.line())
     lacking = table[table[goal].isna()].index
     if len(lacking):
         foot, low = axes.get_xaxis_transform(), np.full(len(lacking), 0.03)
         axes.plot(place[lacking], low, "x", color=GRAY, transform=foot, label="no plan")
     if named:
-        axes.set_xticks(range(table[first].nunique()), table[first].unique())
-    axes.set_xlabel(first)
-    axes.set_ylabel(LABELS.get(goal, goal))
-    if second or len(lacking):
+        texts = [*map(str, table[first].unique())]
+        axes.set_xticks(range(len(texts)), texts, rotation=90 * (len("".join(texts)) > WORDY))
+    elif numbers.min() > 0 and numbers.max() > FAR_APART * numbers.min():
+        axes.set_xscale("log")
+    axes.set(xlabel=first, ylabel=LABELS.get(goal, goal))
+    if others or len(lacking):
         axes.legend()
     dress(axes)
     return figure

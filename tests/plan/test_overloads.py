@@ -20,7 +20,8 @@ from seqopt.plan._infeasible import payload_advice
 from seqopt.plan.solve import graph_of, solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import overloads, payload_limits
-from seqopt.report.sweep import sweep
+from seqopt.report.charts import draw_sweep
+from seqopt.report.sweep import spread, sweep
 from seqopt.workflow import Robust
 from tests.builders import Counting, small_arch, with_part
 from tests.layered import Costs
@@ -50,12 +51,10 @@ def test_payloads_hold_on_every_step_or_are_named(arch25):
     assert kept.summary()["payload_exceeded"] == []
     over = seqopt.optimize(weak(arch25, 350.0))
     assert [excess.limit.response for excess in over.overloads] == ["F_rob1"]
-    table = over.responses()
-    assert over.overloads[0].largest == table["F_rob1_N"].abs().max()
-    assert over.summary()["payload_exceeded"] == [str(over.overloads[0])]
-    assert "rob1 holds up to 375.4 N, more than its payload of 350 N (step" in str(
-        over.overloads[0]
-    )
+    assert over.overloads[0].largest == over.responses()["F_rob1_N"].abs().max()
+    (said,) = over.summary()["payload_exceeded"]
+    assert said == str(over.overloads[0])
+    assert "rob1 holds up to 375.4 N, more than its payload of 350 N (step" in said
 
 
 @pytest.mark.parametrize(("share", "exceeds"), [(1 - 1e-12, False), (1 - 1e-6, True)])
@@ -64,17 +63,15 @@ def test_the_last_bit_decides_nothing(share, exceeds):
     assert limit.exceeded(np.array([0.1 + 0.2, np.nan])).tolist() == [exceeds, False]
 
 
-def small():
-    costs = LayeredCosts(
-        (np.array([2.0, 1.0]), np.array([1.0, 4.0])), (np.zeros((1, 2)), np.ones((2, 2)))
-    )
+def problem():
+    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
     return Costs(costs).compiled().instance
 
 
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
     monkeypatch.setattr("seqopt.instances._judge.proven", lambda *_: 99.0)
-    with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):
-        seqopt.solve(small(), "overlap_dp")
+    with pytest.raises(SolverError, match="the bound 99 is above the path's 1"):
+        seqopt.solve(problem(), "overlap_dp")
 
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
@@ -142,15 +139,12 @@ def test_a_search_without_proof_computes_only_what_it_meets(counted):
     engine, problem = counted
     plan = seqopt.solve(graph_of(problem), "cascade", proof=False)
     few = plan.models
-    assert few == engine.sets
-    assert plan.certificate is None
+    assert (few, plan.certificate) == (engine.sets, None)
     assert np.isnan(plan.selection.objective).all()
     proven = seqopt.solve(problem, "cascade")
-    assert plan.nodes == proven.nodes
-    assert plan.steps == proven.steps
+    assert (plan.nodes, plan.steps) == (proven.nodes, proven.steps)
     assert few < 0.3 * proven.models < 0.3 * engine.sets
-    assert plan.summary()["status"] == "unproven"
-    assert plan.summary()["gap"] is None
+    assert [plan.summary()[name] for name in ("status", "gap")] == ["unproven", None]
     assert "not compared" in repr(plan)
 
 
@@ -165,10 +159,8 @@ def test_a_plan_shows_its_steps_and_choices(engine25):
 
 
 def test_a_plan_of_costs_alone_has_a_path_and_no_steps():
-    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
-    plan = seqopt.solve(Costs(costs).compiled().instance, "overlap_dp")
-    assert plan.nodes == (2,)  # of the graph, whose start is 0
-    assert plan.steps == ()
+    plan = seqopt.solve(problem(), "overlap_dp")
+    assert (plan.nodes, plan.steps) == ((2,), ())  # nodes of the graph, whose start is 0
     assert plan.certificate.gap == 0.0
     assert plan.summary()["objective"] == {"least sum": 1.0}
     for ask in (plan.table, plan.responses):
@@ -196,11 +188,6 @@ def test_every_plan_has_one_summary():
     for plan in plans:
         assert len(plan.responses()) == len(plan.steps)
         assert len(plan.table()) > 0
-
-
-def problem():
-    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
-    return Costs(costs).compiled().instance
 
 
 @pytest.mark.parametrize("limit", [-1, "1", np.nan, None])
@@ -289,7 +276,21 @@ def test_a_command_sweeps_ranges_and_options(tmp_path, capsys):
     assert (out / "sweep.png").stat().st_size > 5000
     assert told(*words) == 0  # all rows are there
     assert pd.read_csv(out / "sweep.csv").equals(rows)
+    assert told(*words, "--rule", "least_grips=1") == 0  # other problems, by other rules
+    assert len(pd.read_csv(out / "sweep.csv")) == 2 * len(rows)
     assert told("wall:columns=2,courses=1", "--over", "payload=1") == 3
+
+
+def test_a_chart_has_the_ranges_inside_the_words_of_scenes():
+    """Over the first of them, in proportion where it goes far, a line for every other value."""
+    scenes = spread("chain:bricks=1..1e4/3log,rise=0.1..0.2/2")
+    table = pd.DataFrame({"scene": scenes, "payload": 300, "T_max_bound": 1.0, "T_max": range(6)})
+    (axes,) = draw_sweep(table, ["scene"]).axes
+    assert (axes.get_xlabel(), axes.get_xscale()) == ("bricks", "log")
+    lines = {line.get_label(): line.get_xydata().tolist() for line in axes.get_lines()}
+    assert lines["rise 0.2"] == [[1, 1], [100, 3], [10000, 5]]
+    (axes,) = draw_sweep(table.assign(scene=["a.json", "b.json", "c.json"] * 2), ["scene"]).axes
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["a.json", "b.json", "c.json"]
 
 
 @pytest.mark.parametrize(
@@ -332,6 +333,5 @@ def test_workers_begin_with_the_largest_of_a_range():
         found = sweep(given, refused, executor=executor)
     assert begun == [4, 3, 2, 1]
     assert [*found["size"]] == [1, 2, 3, 4]  # as they were given
-    begun.clear()
     sweep(given, refused)
-    assert begun == [1, 2, 3, 4]
+    assert begun[4:] == [1, 2, 3, 4]

@@ -57,7 +57,9 @@ def run(
     workers, scene = words.pop("workers", 1), words.pop("scene", "arch25")
     output = Output(out, str(scene))
     output.require(ROWS)
-    problems = _problems(over, str(scene))
+    said = ((n, [*w] if isinstance(w, tuple) else [w]) for n, w in words.items() if w is not True)
+    both = "".join(f" {name}={' '.join(map(str, each))}" for name, each in said)
+    problems = {name + both: own for name, own in _problems(over, str(scene)).items()}
     if output.path is not None:
         make_folder(output.path)
     path = None if output.path is None else output.path / ROWS
@@ -94,10 +96,8 @@ def _problems(over: Sequence[str], scene: str) -> dict[str, Mapping[str, str]]:
     for each in over:
         name, sign, values = each.partition("=")
         if name not in flags or not sign:
-            hint = did_you_mean(name, flags)
-            raise ProblemError(
-                f"--over {each}: optimize has no option {name}{hint}; give NAME=VALUES"
-            )
+            none = f"optimize has no option {name}{did_you_mean(name, flags)}"
+            raise ProblemError(f"--over {each}: {none}; give NAME=VALUES")
         differs[name] = [word for part in values.split(",") for word in spread(part)]
     every = [dict(zip(differs, words, strict=True)) for words in product(*differs.values())]
     if len(every) > MOST:
@@ -108,9 +108,8 @@ def _problems(over: Sequence[str], scene: str) -> dict[str, Mapping[str, str]]:
 
 def _plan(asked: Call, own: Mapping[str, str]) -> Plan:
     """Return the plan of a problem, of the words of all and its own."""
-    options = {name: _flags()[name] for name in own}
-    several = {n for n, option in options.items() if isinstance(option.default, tuple)}
-    words = {options[n].name: [word] if n in several else word for n, word in own.items()}
+    options = [(_flags()[name], word) for name, word in own.items()]
+    words = {each.name: [w] if isinstance(each.default, tuple) else w for each, w in options}
     plan: Plan = asked(**words)
     return plan
 
