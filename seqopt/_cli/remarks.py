@@ -44,7 +44,7 @@ def spent_said(
         parts.append(f"{asked:,} verdicts by {spent['verdicts']['programs']:,} programs")
     if showing is not None:
         shown = f"{showing['verdicts']:,} verdicts shown, {showing['proven']:,} proven for them"
-        parts += [shown, f"{showing['pictures']:,} pictures"]
+        parts += [shown, f"{showing['pictures']} picture{'s' * (showing['pictures'] != 1)}"]
     return f"spent: {'; '.join(parts)}"
 
 

@@ -73,8 +73,7 @@ def plan_pages(
     plan: Plan, prover: BuildProver, summary: Callable[[], Mapping[str, object]]
 ) -> Files:
     """Return page, summary, scene and trace of a plan; the summary says what the page took."""
-    names = ("seconds", "objective", "bound", "gap")
-    page = plan_page(plan, prover)
+    page, names = plan_page(plan, prover), ("seconds", "objective", "bound", "gap")
     trace = pd.DataFrame([[getattr(each, n) for n in names] for each in plan.trace], columns=names)
     finite = json.loads(json.dumps(summary()), parse_constant=lambda _: None)
     return {
@@ -91,10 +90,11 @@ def front_counts(front: Front) -> dict[str, object]:
 
 
 def front_spent(front: Front) -> Spent:
-    """Return what was computed for a Pareto set; its proof counts among what was searched."""
+    """Return what was computed for a Pareto set, of all orders too; its proof is among that."""
     graph = graph_of(front.problem)
-    spent = spent_on(graph, [step for steps in front.steps for step in steps], graph.models)
-    spent["models"]["proof"] = graph.models if front.complete else None
+    models = graph.models or sum(getattr(each, "solved", 0) for each in graph.answers.values())
+    spent = spent_on(graph, [step for steps in front.steps for step in steps], models)
+    spent["models"]["proof"] = models if front.complete else None
     return spent
 
 
@@ -109,10 +109,10 @@ def front_files(
     left: Mapping[str, Sequence[Departure]],
     verdicts: Mapping[str, Sequence[BuildVerdicts]],
     schedule: str,
+    showing: Mapping[str, int],
 ) -> Files:
     """Return tables, chart and page of a Pareto set."""
-    problem = front.problem
-    engine, free = problem.engine, graph_of(problem)
+    problem, engine, free = front.problem, front.problem.engine, graph_of(front.problem)
     summary = {
         **front_counts(front),
         "outside_linear_range": list(builds_in_words(left)),
@@ -132,10 +132,10 @@ def front_files(
     orders = [own.network.scene.build_order for own in front.engines]
     if {*orders} - {engine.network.scene.build_order}:
         points["order"] = [",".join(map(str, order)) for order in orders]
-    plans = [table.assign(point=number) for number, table in enumerate(tables.values(), start=1)]
+    plans = [table.assign(point=k) for k, table in enumerate(tables.values(), start=1)]
     methods = method_tables(engine)[0]
     page = front_page(engine, front, tables, left, verdicts)
-    summary["spent"] = front_spent(front)  # with what the page took
+    summary |= {"spent": front_spent(front), "spent_on_showing": showing}  # with what the page took
     return {
         "scene.json": dump_scene(engine.network.scene),
         PAGE: page,

@@ -163,11 +163,12 @@ def test_verdicts_are_counted_in_all_scenarios(records, count):
 def test_a_pareto_set_solves_every_model_once_and_says_so(records, tmp_path, capsys):
     words = ("pareto", "chain:bricks=6", "--details", "--out", tmp_path / "front")
     said = command(capsys, *words)[2]
-    spent = json.loads((tmp_path / "front/summary.json").read_text())["spent"]
-    models = spent["models"]
+    summary = json.loads((tmp_path / "front/summary.json").read_text())
+    models, showing = summary["spent"]["models"], summary["spent_on_showing"]
     assert models["again"] == models["six_digits"] == len(records.rows[True]) == 0
     assert models["searched"] == models["proof"] == len({*records.rows[False]})
-    assert spent_said(spent) in said
+    assert spent_said(summary["spent"], showing) in said
+    assert showing["verdicts"] >= showing["proven"] > showing["pictures"] == 1
 
 
 def test_commands_say_it_in_one_line_where_details_are_asked(records, tmp_path, capsys):
@@ -183,8 +184,7 @@ def test_commands_say_it_in_one_line_where_details_are_asked(records, tmp_path, 
     assert drawn == {".csv", ".png", ".svg"}
     records.answered = 0
     (line,) = re.findall("spent: .*", command(capsys, "analyze", SMALL, "--details")[2])
-    scene = seqopt.load_scene(SMALL)
-    steps = seqopt.sequential(seqopt.build_network(scene))
+    steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene(SMALL)))
     count = len({(step.bricks, step.grips) for step in steps})
     solved = records.answered  # also with grips that are misplaced, to say how far they may be
     assert line == f"spent: at least {count} had to be; {solved} solved in all, 0 corrected"

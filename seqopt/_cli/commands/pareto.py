@@ -23,7 +23,7 @@ from seqopt.report.comparison import shown_table
 from seqopt.responses.table import Departure, LinearRange, analyze_builds, builds_in_words
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
-from seqopt.stability.failure_map import BuildVerdicts, find_prover
+from seqopt.stability.failure_map import find_prover
 from seqopt.work import INTERRUPT, Tell
 
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
@@ -65,8 +65,7 @@ def run(
     own = engine_mortar(words.get("engine"), mortar, verdicts=stability)
     front: Front = asked(schedule=schedule, mortar=own, progress=progress)
     free, stands = graph_of(front.problem), front.problem.stands
-    shown = None if stands else mortar
-    held = None if stands is None else stands.mortar
+    shown, held = (mortar, None) if stands is None else (None, stands.mortar)
     provers = {
         each: find_prover(each.network, shown, progress, asks=stability, own=held)
         for each in {*front.engines}
@@ -74,10 +73,13 @@ def run(
     tables, left = _responses(front)
 
     def files() -> dict[str, bytes | str]:
-        verdicts = dict[str, Sequence[BuildVerdicts]]()
-        for own, builds in _by_engine(front).items():
-            verdicts |= provers[own].of_builds(builds)
-        return front_files(front, tables, left, verdicts, str(schedule))
+        every = (provers[own].of_builds(builds) for own, builds in _by_engine(front).items())
+        verdicts = {name: each for own in every for name, each in own.items()}
+        return front_files(front, tables, left, verdicts, str(schedule), showing())
+
+    def showing() -> dict[str, int]:  # once all is proven that is shown
+        own = {n: sum(each.spent[n] for each in provers.values()) for n in ("verdicts", "proven")}
+        return {**own, "pictures": int(bool(output.path) > bool(figure_notes()))}
 
     written = output.write(progress, files)
     notes = (
@@ -85,15 +87,14 @@ def run(
         *(f"rules: {each}" for each in free.rules.relaxed(free.engine.network.scene)),
         *next(iter(provers.values())).notes,
         *(figure_notes() if written else ()),
-        *([remarks.spent_said(front_spent(front))] if details else []),
+        *([remarks.spent_said(front_spent(front), showing())] if details else []),
     )
     early = front.stopped == INTERRUPT
     points = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     count, whole = len(front.steps), "complete" if front.complete else "not complete"
-    text = f"{count} point{'s' * (count != 1)}, {whole}"
     answer = Answer(
         {**front_counts(front), "points": shown_table(front.table)},
-        f"{points}{text}; {output.said()}",
+        f"{points}{count} point{'s' * (count != 1)}, {whole}; {output.said()}",
         written=written,
         notes=notes,
         failures=(INTERRUPTED,) if early else (),
