@@ -38,7 +38,7 @@ MARKERS = "sD^vP*"
 IN_A_ROW = 2  # charts
 LEAST = 0.01  # share of its numbers that an axis spans at least
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
-FAR_APART, WORDY = 100, 60  # values make an axis logarithmic; letters that are too many for a line
+FAR_APART = 100  # values that differ so many times make an axis logarithmic
 VERDICTS = {
     "not a step": "#ffffff",
     Verdict.STANDS.value: SKY,
@@ -120,10 +120,7 @@ def front_figure(
 
 
 def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
-    """Draw the first goal over the first name, a line for all values of the others.
-
-    Problems without a plan are crosses. Of ``names``, a scene stands for its words that differ.
-    """
+    """Draw the first goal over the first name; a scene stands for its words that differ."""
     goal = next(c.removesuffix("_bound") for c in table.columns if c.endswith("_bound"))
     if "scene" in names and len(table["scene"].str.partition(":")[0].unique()) == 1:
         pairs = table["scene"].str.findall(r"([^:,=]+)=([^,]*)").map(dict)
@@ -143,12 +140,10 @@ def draw_sweep(table: pd.DataFrame, names: Sequence[str]) -> Figure:
     if len(lacking):
         foot, low = axes.get_xaxis_transform(), np.full(len(lacking), 0.03)
         axes.plot(place[lacking], low, "x", color=GRAY, transform=foot, label="no plan")
+    far = not named and 0 < FAR_APART * numbers.min() < numbers.max()
+    axes.set(xlabel=first, ylabel=LABELS.get(goal, goal), xscale="log" if far else "linear")
     if named:
-        texts = [*map(str, table[first].unique())]
-        axes.set_xticks(range(len(texts)), texts, rotation=90 * (len("".join(texts)) > WORDY))
-    elif numbers.min() > 0 and numbers.max() > FAR_APART * numbers.min():
-        axes.set_xscale("log")
-    axes.set(xlabel=first, ylabel=LABELS.get(goal, goal))
+        axes.set_xticks(range(table[first].nunique()), table[first].unique(), rotation=90)
     if others or len(lacking):
         axes.legend()
     dress(axes)

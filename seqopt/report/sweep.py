@@ -98,8 +98,7 @@ def sweep(
     Raises
     ------
     SeqoptError
-        If two problems have one name, or the file is none of a sweep. A problem without a plan is a
-        row.
+        If two problems have one name, or the file is none of a sweep; one without a plan is a row.
 
     Examples
     --------
