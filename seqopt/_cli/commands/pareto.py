@@ -79,7 +79,7 @@ def run(
 
     def showing() -> dict[str, int]:  # once all is proven that is shown
         own = {n: sum(each.spent[n] for each in provers.values()) for n in ("verdicts", "proven")}
-        return {**own, "pictures": int(bool(output.path) > bool(figure_notes()))}
+        return {**own, "pictures": int(bool(output.path) and not figure_notes())}
 
     written = output.write(progress, files)
     notes = (
