@@ -41,7 +41,7 @@ from seqopt.work import Progress, Tell, _one_thread, map_ordered, worker_pool
 
 _STACKED = Later("seqopt.engines.rigid._stacked")  # with scenarios alone
 
-SHARED = 3e5  # work at once from which on processes are sooner together
+SHARED = 1e7  # work at once, a third of a second and more, from which on it may be shared
 COMPILED = 1e6  # work from which on compiled loops save more than loading them takes
 # Engines of the last two runs of each thread of a worker: executors of users have no storage for
 # workers' data between tasks, each of which would build its engine again.
