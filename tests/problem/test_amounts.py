@@ -362,19 +362,23 @@ def test_what_is_not_close_is_rounded_alike_with_any_error_of_the_share(
 
 
 def test_ranks_by_six_digits_are_those_by_all_of_them():
-    network = seqopt.build_network(small_arch(9))
-    engine = seqopt.make_engine("compliance", network)
+    engine = seqopt.make_engine("compliance", small_arch(9))
     criterion = seqopt.CRITERIA["equations-2-3"]
-    problem = graph_of(seqopt.pose(engine, seqopt.three_robot_loop(network), criterion))
-    exact = replace(problem, limits=(Limit("T_max", 1e9),), answers={}, judged={})
+    problem = graph_of(seqopt.pose(engine, seqopt.three_robot_loop(engine.network), criterion))
+    passed = Filter("passed", lambda states: np.ones(len(states.nodes), dtype=bool))
+    exact = replace(problem, filters=(passed,), answers={}, judged={})
+    limited, sure = (replace(each, limits=(Limit("T_max", 40.0),)) for each in (problem, exact))
     assert problem.screened is not problem.sets
     assert exact.screened is exact.sets
-    ranked = 0
+    ranked = kept = 0
     for level in range(1, 1 + problem.space.levels):
         if problem.space.open_columns(level):
             states = problem.space.candidates(level).states
             own, all_digits = (each.candidates.among(level, states) for each in (problem, exact))
             assert own.tolist() == all_digits.tolist()
-            ranked += len(states)
+            within = limited.values(level, states, rough=True)[1]
+            assert within.tolist() == sure.values(level, states)[1].tolist()
+            ranked, kept = ranked + len(states), kept + int(within.sum())
+    assert 0 < kept < ranked
     assert problem.six_digit_models > 0.5 * ranked
     assert problem.sets.solved < 0.2 * ranked
