@@ -57,8 +57,11 @@ def flaws(figure: Figure) -> list[str]:
         words = re.sub(r"\(.*?\)|the same plan: .*", "", text.get_text())
         if CODE.search(words) or any(name in words for name in names):
             out.append(f"{text.get_text()!r} is a name of the code")
+    legends = figure.findobj(Legend)
+    named = {text.get_text() for legend in legends for text in legend.get_texts()}
     for axes in figure.axes:
-        out += _alike(axes) + _unnamed(figure, axes)
+        lost = {*_series(axes)} - named if len(_series(axes)) > 1 else ()
+        out += [*_alike(axes), *(f"{name!r} is in no legend" for name in lost)]
     return out
 
 
@@ -84,11 +87,3 @@ def _alike(axes: Axes) -> list[str]:
         for a, b in combinations(drawn, 2)
         if drawn[a][1:3] == drawn[b][1:3] and (drawn[a][3] in HOLLOW) == (drawn[b][3] in HOLLOW)
     ]
-
-
-def _unnamed(figure: Figure, axes: Axes) -> list[str]:
-    """Return the series that no legend names, where there is more than one."""
-    drawn = _series(axes)
-    legends = figure.findobj(Legend)
-    named = {text.get_text() for legend in legends for text in legend.get_texts()}
-    return [f"{name!r} is in no legend" for name in drawn if len(drawn) > 1 and name not in named]

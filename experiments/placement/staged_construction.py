@@ -31,12 +31,13 @@ from experiments.placement.parts.staged import (
     next_state,
     staged_fields,
     state_fields,
+    worst_ratio,
 )
 from seqopt import Network, Step, three_robot_loop
 from seqopt.engines.interface import Fields
 from seqopt.engines.rigid._mixed import Ungripped, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
+from seqopt.responses.quantities import RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.table import step_fields
 from seqopt.sequence.methods import METHODS
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, thin
@@ -45,14 +46,6 @@ from seqopt.study import PUBLISHED_BEST
 History = TypeVar("History")
 Advance = Callable[[History, Step], tuple[History, Fields]]
 """Takes what came before and a step; returns what has come then, and the step's fields."""
-
-
-def worst_ratio(network: Network, fields: Fields, limits: tuple[tuple[str, float], ...]) -> float:
-    """Return the largest ratio of a response of one grip set to its limit."""
-    found = {"F_largest": lengths(fields.grip_force).max(axis=1, initial=0.0)}
-    names = [name for name, _ in limits if name not in found]
-    found |= {name: CHOSEN_BY[name].of(network, fields) for name in names}
-    return max(float(found[name][0]) / limit for name, limit in limits)
 
 
 def staged_way(network: Network, placing: Placing) -> Advance[StagedState]:

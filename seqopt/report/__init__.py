@@ -22,9 +22,9 @@ from seqopt._registry import later
 
 if TYPE_CHECKING:
     from seqopt.report._questions import report
-    from seqopt.report.comparison import Comparison, compare, format_comparison, method_tables
+    from seqopt.report.comparison import Comparison, compare, format_comparison
 
-__all__ = ["Comparison", "compare", "format_comparison", "method_tables", "report"]
+__all__ = ["Comparison", "compare", "format_comparison", "report"]
 __getattr__, __dir__ = later(
     __name__, dict.fromkeys(__all__, "comparison") | {"report": "_questions"}
 )

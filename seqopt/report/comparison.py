@@ -147,14 +147,6 @@ def compare(
     Returns
     -------
     Comparison
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> wall = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
-    >>> found = compare(wall, seqopt.CRITERIA["worst-ratio"])
-    >>> float(found.table.loc["sequential", "F_rob"].round(1))  # N
-    37.3
     """
     asked, engine = engine, simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, method_tables(engine, robots)
@@ -293,14 +285,13 @@ def _published_row(problem: Problem, plans: Iterable[Plan]) -> dict[str, object]
 
 def _row(plan: Plan) -> dict[str, object]:
     """Return the objective of a plan, and the seconds that it alone took; for a free one all."""
+    models, seconds = plan.models, sum(plan.seconds.values())
     if plan.method == FREE:
         bound, value = plan.selection.bound[0], plan.selection.objective[0]
         gap = (value - bound) / (abs(value) or 1.0)  # without weight all responses are zero
-        models, seconds = plan.models, sum(plan.seconds.values())
     else:
         assert plan.certificate is not None  # asked for
         value, gap = plan.certificate.objective, plan.certificate.gap
-        models = plan.models
         if plan.formulation.windowed == ():  # alone it needs fewer
             again: Problem = plan.problem  # type: ignore[assignment]  # of a comparison
             models = solve(replace(again), plan.formulation, proof=False).models
@@ -314,22 +305,8 @@ def method_tables(
 ) -> tuple[dict[str, pd.DataFrame], list[str], list[StepError | MechanismError]]:
     """Return the responses of every method without open grips, and of the published plan.
 
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses; it has the scene.
-    robots : sequence of str, optional
-        Names of those that take part, the first two of which are taken.
-
-    Returns
-    -------
-    tables : dict of str to pandas.DataFrame
-        By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
-    notes : list of str
-        First why other methods cannot build the scene; then which are not what they are called,
-        and which robots never grip.
-    refused : list of StepError or MechanismError
-        Why methods are left out.
+    ``robots``: names of those that take part, the first two of which are taken. Results: tables as
+    of `seqopt.analyze`; notes, first why other methods cannot build the scene; and their errors.
     """
     scene = engine.network.scene
     tables, built = dict[str, pd.DataFrame](), dict[str, tuple[Step, ...]]()

@@ -41,12 +41,6 @@ RIGHT = "wall:columns=2,courses=2"
 TIMES = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
-def _npz(**arrays: np.ndarray) -> bytes:
-    out = io.BytesIO()
-    np.savez_compressed(out, **arrays)
-    return out.getvalue()
-
-
 def _instance(goals: str) -> seqopt.Instance:
     scene = with_robots(small_arch(3), 2).with_durations(TIMES)
     engine = seqopt.make_engine("compliance", scene)
@@ -146,7 +140,8 @@ def _of_caches() -> Iterator[tuple[str, File]]:
         "found": np.ones((r, n), int),
     }
     assert {*table} == {each.name for each in fields(PostureTable)}
-    yield "postures", ("postures.npz", _npz(**table), lambda path: read_postures(path, site))
+    np.savez_compressed(out := io.BytesIO(), **table)
+    yield "postures", ("postures.npz", out.getvalue(), lambda path: read_postures(path, site))
 
 
 @cache

@@ -150,6 +150,20 @@ def test_incumbents_over_time_are_drawn_where_a_way_tells_them(measured):
 
 
 @pytest.mark.slow
+def test_plans_are_valued_by_a_model_of_ones_own(measured):
+    """How many steps a plan has as a model: which no way knew, and in which none is proven."""
+    counts = np.array([len(steps) for steps in measured.plans])
+    found = measured.valued_by("steps", len)
+    assert found.table["regret"].to_numpy() == pytest.approx(counts / counts.min() - 1)
+    assert not found.is_proven
+    assert found.take["regret"] == 0
+    short = measured.valued_by("short", lambda steps: {counts.min(): 1.0}.get(len(steps), np.inf))
+    assert ((short.table["status"] == FALLS) == (counts > counts.min())).all()
+    with pytest.raises(NothingFoundError, match="mine: no plan holds in it"):
+        measured.valued_by("mine", lambda _: np.inf)
+
+
+@pytest.mark.slow
 def test_softer_grips_are_the_reference_and_rigid_ones_a_way():
     scene = small_arch(3).with_grips(1e5)
     found = measure_regret(seqopt.make_engine("compliance", scene), WORST, **ONCE)

@@ -154,17 +154,13 @@ def run(names: list[str]) -> None:
         same = path.exists() and path.read_bytes() == content
         print(f"{name}: {len(content)} bytes, {'as it was' if same else 'new'}, sha256 {checksum}")
         path.write_bytes(content)
-        if name in LARGE:
-            _store_size(name, read_instance(path), len(content))
-
-
-def _store_size(name: str, one: Instance, size: int) -> None:
-    """Store how large an instance is that is made by its command alone."""
-    row = {"instance": name, "nodes": one.nodes, "arcs": one.arcs, "size_MB": size / 1e6}
-    before = stored("instance_large") if (RESULTS / "instance_large.csv").exists() else None
-    table = pd.concat([before, pd.DataFrame([row])]).drop_duplicates("instance", keep="last")
-    known = table[table["instance"].isin(LARGE)]
-    save_table(known.sort_values("instance"), "instance_large", 3)
+        if name in LARGE:  # which its command alone makes
+            one, size = read_instance(path), len(content) / 1e6
+            row = {"instance": name, "nodes": one.nodes, "arcs": one.arcs, "size_MB": size}
+            known = stored("instance_large") if (RESULTS / "instance_large.csv").exists() else None
+            table = pd.concat([pd.DataFrame([row]), known]).drop_duplicates("instance")
+            own = table[table["instance"].isin(LARGE)].sort_values("instance")
+            save_table(own, "instance_large", 3)
 
 
 if __name__ == "__main__":

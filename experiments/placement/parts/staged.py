@@ -32,8 +32,8 @@ from seqopt.engines.rigid._mixed import (
 from seqopt.errors import StepError
 from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network, network_of
+from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.responses.table import response_table, step_named
-from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence, require_steps
 
@@ -72,7 +72,7 @@ class StagedState(FrozenValue):
 
 
 def analyze_staged(
-    network: Network | Scene, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
+    network: Network | Scene, steps: Sequence[Step], placing: Placing = Placing.FITTED
 ) -> pd.DataFrame:
     """Return the responses of every step, with forces that earlier steps lock in, as `analyze`.
 
@@ -84,25 +84,12 @@ def analyze_staged(
 
 
 def staged_fields(
-    network: Network, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
+    network: Network, steps: Sequence[Step], placing: Placing = Placing.FITTED
 ) -> Iterator[Fields]:
     """Yield the full fields of every step, of one grip set each; see `analyze_staged`."""
-    if require_steps(steps) and steps[0].number > 1:
-        raise StepError(
-            f"steps from {steps[0].number} on: what was locked in before them is not known; give "
-            "the whole build, or --placing free"
-        )
-    if any(step.kind is StepKind.REMOVE for step in steps):
-        raise StepError(
-            "a take-down: what was locked in while it was built is not known; analyze it without "
-            "--placing"
-        )
+    if require_steps(steps)[0].number > 1 or any(s.kind is StepKind.REMOVE for s in steps):
+        raise StepError("what was locked in before is not known; give a whole build from step 1 on")
     check_sequence(network.scene, steps)
-    try:
-        placing = Placing(placing)
-    except ValueError:
-        known = ", ".join(way.value for way in Placing)
-        raise StepError(f"placing {short(placing)} does not exist; give {known}") from None
     state = StagedState(0, np.zeros(0), np.zeros((len(network.springs.since), 6)), np.zeros(0))
     parts: Ungripped | None = None
     for step in steps:
@@ -151,6 +138,14 @@ def state_fields(parts: Ungripped, state: StagedState) -> Fields:
         brick_twist=state.twist.reshape(1, -1, 6).copy(),
         grip_moment=borne[..., 3:].copy(),
     )
+
+
+def worst_ratio(network: Network, fields: Fields, limits: tuple[tuple[str, float], ...]) -> float:
+    """Return the largest ratio of a response of one grip set to its limit."""
+    found = {"F_largest": lengths(fields.grip_force).max(axis=1, initial=0.0)}
+    names = [name for name, _ in limits if name not in found]
+    found |= {name: CHOSEN_BY[name].of(network, fields) for name in names}
+    return max(float(found[name][0]) / limit for name, limit in limits)
 
 
 def _loaded(

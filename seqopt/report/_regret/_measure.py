@@ -39,7 +39,7 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.solve import _solve_run, graph_of, on_the_way, pose
 from seqopt.problem.criteria import WORST_OVER_METHODS, Criterion, RankSum
 from seqopt.problem.problem import Problem
-from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, NOTHING, RegretTable
+from seqopt.report._regret._table import CUT, DONE, FAILED, FALLS, RegretTable, with_regrets
 from seqopt.sequence.part import find_schedule
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
@@ -60,7 +60,7 @@ FEW = ("cascade", "path_beam", "schedule_search")  # formulations that need not 
 SLOW = ("frame", "discrete")  # engines that come last
 KEPT, ALL = 0.7, 0.95  # shares of its time after which a search, and a proof, ends
 Found = TypeVar("Found")
-Row: TypeAlias = tuple[dict[str, object], Sequence[Finding]]  # with incumbents and bounds
+Row: TypeAlias = tuple[dict[str, object], Sequence[Finding], tuple[Step, ...]]  # curve, steps
 Valued: TypeAlias = tuple[float, float, str, str]  # with the end, without, status, why it falls
 
 
@@ -166,7 +166,8 @@ class _Course:
             took, plan = self.timer.least(seconds, call)
         except (SeqoptError, TimeoutError) as error:
             late = isinstance(error, TimeoutError | TimeUpError)
-            return row | {"status": CUT if late else FAILED, "why": "" if late else str(error)}, ()
+            lost = {"status": CUT} if late else {"status": FAILED, "why": str(error)}
+            return row | lost, (), ()
         if plan.steps not in self.known:
             self.known[plan.steps] = self._value(plan.steps)
         value, along, status, why = self.known[plan.steps]
@@ -178,7 +179,7 @@ class _Course:
         row |= {"seconds": took, "value": value, "gap": gap, "exact": exact}
         row |= {"own": own, "error": abs(own - along) / (abs(along) or 1.0)}
         row |= {"models": plan.models, "status": status, "why": why}
-        return row, [each for each in found if isinstance(each, Finding)]
+        return row, [each for each in found if isinstance(each, Finding)], plan.steps
 
     def rows(self, ways: Sequence[Way], seconds: float, progress: Tell) -> Iterator[Row]:
         """Yield the rows of ways, which share the time."""
@@ -189,10 +190,10 @@ class _Course:
             left, others = end - self.timer.now(), len(ways) - done
             most = left / 4 if way.formulation in FEW else min(left / 2, SHARE * left / others)
             skips = (way.engine, way.schedule) in late and way.formulation not in FEW
-            row, found = self.row(way, 0.0 if skips else max(left / others, most))
-            if row["status"] == CUT and way.formulation not in FEW:
+            found = self.row(way, 0.0 if skips else max(left / others, most))
+            if found[0]["status"] == CUT and way.formulation not in FEW:
                 late.add((way.engine, way.schedule))
-            yield row, found
+            yield found
 
     def _value(self, steps: Sequence[Step]) -> Valued:
         """Return the worst step of a plan in the reference; infinite, and why, where it falls."""
@@ -248,13 +249,10 @@ def measure_regret(
     course = _Course(problem, criterion, loop, rules, mortar, timer)
     name = _name_of(named)
     ways, refused = _ways(course, name)
-    rows, curves = zip(*course.rows(ways, seconds - timer.now() + start, progress), strict=True)
+    each = course.rows(ways, seconds - timer.now() + start, progress)
+    rows, curves, plans = zip(*each, strict=True)
     table = pd.DataFrame(rows)
-    best = table["value"].min()
-    regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
-    regret, error = (e.where(~(e < NOTHING), 0.0) for e in (regret, table["error"]))
-    table = table.assign(regret=regret, error=error)
-    if not np.isfinite(best):
+    if not np.isfinite(table["value"].min()):
         why = next((f": {row['engine']}, {row['why']}" for row in rows if row["why"]), "")
         more = "; give more seconds" * bool((table["status"] == CUT).any())
         raise NothingFoundError(f"regret: no plan holds in the reference{why}{more}")
@@ -262,7 +260,7 @@ def measure_regret(
     soft = ", soft grips" * bool(np.any(engine.network.compliances.compliance))
     stands = ", where every step stands" * (mortar is not None and name != "discrete")
     about = scene.name, len(scene.bricks), name, f"{name}{soft}{stands}", worst.name, seconds
-    return RegretTable(*about, table, refused, curves)
+    return RegretTable(*about, with_regrets(table), refused, curves, plans)
 
 
 def _name_of(engine: Engine) -> str:

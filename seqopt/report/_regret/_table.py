@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +13,10 @@ import pandas as pd
 
 from seqopt._registry import display
 from seqopt.arrays import Bools
+from seqopt.errors import NothingFoundError
 from seqopt.graph.formulation import Finding
 from seqopt.sequence.rules import FREE
+from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,6 +62,14 @@ def apart(shares: pd.Series[float]) -> Bools:
     return np.isin(np.arange(len(logs)), kept)
 
 
+def with_regrets(table: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with the regret of their values over the least; what is tiny is none."""
+    best = table["value"].min()
+    regret = ((table["value"] - best) / (abs(best) or 1.0)).clip(lower=0.0)
+    shares = pd.DataFrame({"regret": regret, "error": table["error"]})
+    return table.assign(**shares.where(~(shares < NOTHING), 0.0))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RegretTable:
     """What the plans of all ways cost in the most detailed model of one scene.
@@ -71,7 +81,7 @@ class RegretTable:
     its ``own`` model, the ``regret`` over the best known, the ``gap`` to the bound that it proves,
     the ``error`` of what its model promised, whether it proves its plan (``exact``), ``models``
     solved, its ``status``, and ``why`` there is no plan, or none that holds; ``refused``: engines
-    that cannot model the scene, and why; ``curves``: incumbents and bounds over time, row by row.
+    that cannot model it, and why; ``curves``: incumbents and bounds, ``plans``: steps, row by row.
     """
 
     scene: str
@@ -83,6 +93,7 @@ class RegretTable:
     table: pd.DataFrame
     refused: Mapping[str, str] = field(default_factory=dict)
     curves: Sequence[Sequence[Finding]] = ()
+    plans: Sequence[tuple[Step, ...]] = ()
 
     def __repr__(self) -> str:
         return f"<RegretTable of {self.scene}: {self.sentence}>"
@@ -97,6 +108,20 @@ class RegretTable:
         """Return the chart of speed against regret (extra ``plot``)."""
         found: Figure = display(RegretTable, "plot")(self)
         return found
+
+    def valued_by(self, model: str, worst: Callable[[tuple[Step, ...]], float]) -> RegretTable:
+        """Return the regrets of the same plans in a model of one's own, in which none is proven.
+
+        ``worst``: takes a plan's steps; infinite where it falls. `NothingFoundError` if all do.
+        """
+        known = {steps: worst(steps) for steps in dict.fromkeys(self.plans) if steps}
+        value = pd.Series([known.get(steps, np.nan) for steps in self.plans])
+        if not np.isfinite(value.min()):
+            raise NothingFoundError(f"{model}: no plan holds in it")
+        rows = self.table.assign(value=value, error=(self.table["own"] / value - 1.0).abs())
+        rows.loc[np.isfinite(value) & (rows["status"] != CUT), ["status", "why"]] = DONE, ""
+        rows.loc[np.isinf(value), ["status", "why"]] = FALLS, ""
+        return replace(self, reference=model, valued=model, table=with_regrets(rows))
 
     @cached_property
     def kept(self) -> Bools:
