@@ -127,18 +127,20 @@ def _outside(table: pd.DataFrame) -> dict[str, str]:
 
 def _taken(rows: pd.DataFrame) -> dict[str, str]:
     """Return which way to take in each scene of README's chart, and what others lose."""
-    names = ("arch", "soft", "dry", "vault", "wall")
+    names = ("arch", "soft", "dry", "vault", "wall", "staged")
     found = dict(zip(names, tables(rows), strict=True))
     soft, arch = found["soft"].table, found["arch"].table
     rigid = soft[(soft["engine"] == RIGID_GRIPS) & (soft["without"] == "")]
     took = arch.set_index(["engine", "schedule", "formulation", "without"])["seconds"]
     search = "free", "schedule_search", ""
+    off = found["staged"].table["value"] / found["staged"].table["own"]
     return {f"take_{name}": table.sentence for name, table in found.items()} | {
         "rigid_grips_regret": " and ".join(percent(each) for each in sorted(rigid["regret"])),
         "ranks_regret_soft": " and ".join(
             percent(each) for each in sorted(soft.loc[soft["without"] == "ranks", "regret"])
         ),
         "rigid_proof_s": two(took["compliance", "loop", "overlap_dp", "ranks"]),
+        "promised": f"{two(off.min())} to {two(off.max())}",
         "frame_times": two(took["frame", *search] / took["compliance", *search]),
     }
 

@@ -25,11 +25,10 @@ MARKS = {"loop": ("o", "the loop"), FREE: ("s", "the free schedule")}
 PALE = 0.28
 LEAST = 1e-6  # what is less is drawn in the band of none
 MOST = 1e-3  # from which on an axis is logarithmic, unless regrets are less
-LINE = 24  # letters of a line beside a point
+LINE, FEW_TICKS = 24, 6  # letters of a line beside a point, and ticks that stand side by side
 ABOVE, BELOW = ((-12, 9), "baseline"), ((-4, -8), "top")  # points, from a point to its words
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 LETTER = 0.072  # inches of a letter of a title
-FEW_TICKS = 6
 INCUMBENT: dict[str, Any] = {"lw": 0.7, "ls": "-"}  # over time
 BOUND: dict[str, Any] = {"lw": 0.9, "ls": ":"}
 
@@ -53,7 +52,8 @@ def regret_chart(*tables: RegretTable, width: float = WIDTH) -> Figure:
     for letter, axes, each in zip("abcdefgh", panels, tables, strict=False):
         _regrets(axes, each)
         took = each.take
-        words = f"take {took['engine']}, {_short(took)}: {seconds_text(took['seconds'])}"
+        took_s = seconds_text(took["seconds"]).replace(" ", "\N{NO-BREAK SPACE}")
+        words = f"take {took['engine']}, {_short(took)}: {took_s}"
         begin, end = (f"({letter}) ", "") if tables[1:] else ("", f", valued by {each.valued}")
         lines = [f"{begin}{each.scene}, {each.bricks} bricks{end}", words.replace("_", " ")]
         most = int((width / across - 0.6) / LETTER)
