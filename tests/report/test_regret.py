@@ -198,7 +198,7 @@ def test_the_chart_shows_both_and_pales_what_is_beaten():
     assert sum(line.get_alpha() == PALE for line in points) == 2
     (ring,) = (line for line in points if line.get_markersize() > 10)
     assert list(ring.get_xdata()) == [0.1]
-    assert "take compliance, schedule search: 0.100 s" in regrets.get_title(loc="left")
+    assert "take compliance, schedule search: 0.100\xa0s" in regrets.get_title(loc="left")
     assert "proven 0" in [tick.get_text() for tick in regrets.get_yticklabels()]
 
 
