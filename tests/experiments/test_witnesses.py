@@ -183,7 +183,7 @@ def test_own_programs_agree_with_the_verdicts_and_contradict_false_ones(monkeypa
 @pytest.mark.skipif(not other(), reason="no OpenBLAS, or no other kernel by name")
 def test_every_kernel_of_the_machine_is_known_by_what_runs():
     found = every()
-    assert {*running().values()} <= {*found}
+    assert {n.replace("Zen", "Haswell") for n in running().values()} <= {*found}  # one kernel
     assert other() in found
     assert {*found.values()} <= {*NAMES}
 
