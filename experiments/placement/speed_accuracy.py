@@ -164,7 +164,7 @@ def holds(rows: pd.DataFrame, searches: pd.DataFrame) -> dict[str, bool]:
             }
             == {"stands"},
             "if steps lock something in, every plan is twice as bad as it promised": bool(
-                (found[STAGED].table["error"].dropna() >= 0.5).all()
+                (found[STAGED].table.eval("value / own").dropna() >= 2).all()
             ),
         }
     return parts
