@@ -55,18 +55,11 @@ _NEAR = 0.7  # share of all blocks up to which those near what fell take less th
 _MOVES = 1e-2  # of the largest motion, over which a block falls
 Parts = Callable[[int, Grips], Assembly]
 """Gives partial structures with their grips, as `PartialAssemblies`."""
-_CHUNKS = 8  # for every worker, of neighboring steps, which are proven by one another
+_CHUNKS = 3  # for every worker, of neighboring steps, which are proven by one another
 _LARGE = 50  # bricks from which on steps are proven one by one, by the grips they have in common
 _Find = Callable[[PartialAssemblies, Sequence[Step]], Iterator[Stability]]
-_NOTHING = Stability(
-    Verdict.STANDS,
-    proof="nothing stands",
-    bond=0.0,
-    friction=0.0,
-    pull=np.full(DIRECTIONS, np.inf),
-    tilt=np.pi / 2,
-    grip=0.0,
-)  # of the empty site, where a take-down ends
+_FREE = np.full(DIRECTIONS, np.inf)  # of the empty site, where a take-down ends
+_NOTHING = Stability(Verdict.STANDS, "nothing stands", 0.0, 0.0, _FREE, np.pi / 2, grip=0.0)
 _unpickled = lru_cache(maxsize=1)(pickle.loads)  # what a worker is sent, the same for all chunks
 _TILT = "tilt_survived_deg"
 _MARGINS = (
@@ -300,7 +293,7 @@ def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
 
 
 def each_stability(
-    network: Network,
+    built: Network | PartialAssemblies,
     steps: Sequence[Step],
     mortar: Mortar,
     margins: tuple[str, ...] = (),
@@ -311,7 +304,7 @@ def each_stability(
     ``shared``: executor and workers.
     """
     find = partial(_each, mortar=mortar, margins=margins)
-    parts = parts_of(network, steps)
+    parts = parts_of(built, steps)
     with worker_pool(*shared) as pool:
         if pool is None:
             yield from find(parts, steps)

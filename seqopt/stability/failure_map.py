@@ -33,11 +33,11 @@ from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, build_network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._steps import each_verdict
+from seqopt.stability._steps import each_stability, each_verdict
 from seqopt.stability.assessment import Stability, assess
 from seqopt.stability.limit_analysis import horizontal
 from seqopt.stability.verdict import Verdict
-from seqopt.work import Tell, with_progress
+from seqopt.work import Tell, _keep, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,6 +51,7 @@ AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 
 _TILTED = 8  # directions, evenly spread
 _SURE = 1e-3  # share by which more is taken than a step is proven to need
 _TRIED = 24  # nodes where one more grip is tried, the fastest ones first
+_SHARED = 50_000  # bricks of all steps from which on workers are worth their start
 _HINGE = 0.5  # share of the opening that turning brings about, from which on it is a turn
 
 
@@ -136,15 +137,20 @@ class BuildProver:
         return tuple(f"stability: {each}" for each in lines)
 
     def of_builds(
-        self, builds: Mapping[str, Sequence[Step]]
+        self, builds: Mapping[str, Sequence[Step]], workers: int = 1
     ) -> dict[str, tuple[BuildVerdicts, ...]]:
-        """Return the verdicts of builds by their steps, one for every mortar."""
+        """Return the verdicts of builds by their steps, one for every mortar.
+
+        ``workers``: processes that share large builds.
+        """
         distinct = {_state(step): step for steps in builds.values() for step in steps}
         # one that fewer hold comes before others, which its forces prove
         ordered = sorted(distinct.values(), key=lambda step: (step.bricks, len(step.held)))
+        workers = workers if sum(step.bricks for step in ordered) >= _SHARED else 1
         try:
-            for name in () if self.refusal else self.mortars:
-                self._ask(name, [s for s in ordered if _state(s) not in self._known[name]])
+            with _keep(workers=workers):
+                for name in () if self.refusal else self.mortars:
+                    self._ask(name, ordered, workers)
         except SceneError as error:
             self.refusal = str(error)
         return {
@@ -153,15 +159,16 @@ class BuildProver:
             if self.mortars and not self.refusal
         }
 
-    def _ask(self, name: str, new: Sequence[Step]) -> None:
+    def _ask(self, name: str, steps: Sequence[Step], workers: int) -> None:
         """Find the verdicts of steps with a mortar, and those implied with other mortars."""
+        new = [step for step in steps if _state(step) not in self._known[name]]
         if not new:
             return
         what, mortar = f"proving what stands, {name}", self.mortars[name]
         most = max(step.bricks for step in new) or 1
         if self._parts is None or self._parts.bricks < most:
             self._parts = PartialAssemblies(self.network, most)
-        each = each_verdict(self._parts, new, mortar)
+        each = each_stability(self._parts, new, mortar, shared=(None, workers))
         found = dict[_State, Verdict]()
         for step, one in zip(with_progress(what, new, self._progress), each, strict=True):
             self._known[name][_state(step)] = found[_state(step)] = one.verdict
@@ -235,11 +242,10 @@ class FailureMap:
     ----------
     cases : pandas.DataFrame
         A row for every ``build``, what ``holds`` and ``value`` of the ``axis`` (friction, tilt in
-        degrees): how many ``steps`` there
-        are, ``fall`` and are ``undecided``; of the ``first_step`` that falls the ``bricks`` placed,
-        ``brick`` and ``joint`` that fail first and the ``motion`` there; the ``bond_needed_Pa`` and
-        the ``friction_needed`` with which all steps stand, inf if none is enough; and
-        ``grip_node``, where one more robot would hold the first step.
+        degrees): how many ``steps`` there are, ``fall`` and are ``undecided``; of the
+        ``first_step`` that falls the ``bricks`` placed, ``brick`` and ``joint`` that fail first and
+        the ``motion`` there; the ``bond_needed_Pa`` and the ``friction_needed`` with which all
+        steps stand, inf if none is enough; and ``grip_node``, where one more robot would hold it.
     steps : pandas.DataFrame
         The ``verdict`` of every ``step`` of these, and of how many ``bricks`` it is.
     usual : float

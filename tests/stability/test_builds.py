@@ -16,8 +16,6 @@ from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.verdict import Verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
-
-
 pytestmark = pytest.mark.xdist_group("builds")  # what all look at is made once
 
 
@@ -37,7 +35,9 @@ def found(flat, builds):
 
 
 @pytest.mark.slow
-def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
+def test_they_are_those_of_every_step_on_its_own(flat, builds, found, monkeypatch):
+    monkeypatch.setattr(failure_map, "_SHARED", 0)
+    assert BuildProver(flat).of_builds(builds, workers=2) == found
     for name, steps in builds.items():
         for each, (mortar, held) in zip(found[name], SHOWN.items(), strict=True):
             assert each.mortar == mortar
@@ -49,15 +49,14 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
 
 def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeypatch):
     """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
-    asked, real = {}, failure_map.each_verdict
+    asked, real = {}, failure_map.each_stability
 
-    def noted(parts, steps, mortar):
+    def noted(parts, steps, mortar, shared):
         asked.setdefault(mortar, {(step.bricks, step.grips) for step in steps})
-        return real(parts, steps, mortar)
+        return real(parts, steps, mortar, shared=shared)
 
-    monkeypatch.setattr(failure_map, "each_verdict", noted)
-    shown = {name: SHOWN[name] for name in ("dry", "epoxy")}
-    prover, steps = BuildProver(flat, shown), builds["cantilever"]
+    monkeypatch.setattr(failure_map, "each_stability", noted)
+    prover, steps = BuildProver(flat), builds["cantilever"]
     (said, _) = prover.of_builds({"a": steps})["a"]
     pairs = zip(steps, said.verdicts, strict=True)
     open_ = {(step.bricks, step.grips) for step, v in pairs if v is Verdict.FALLS}

@@ -84,11 +84,11 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     """Write a plan, and return its answer; ``words``: that asked for it."""
     shown, standing = words.get("stands", words.get("mortar")), plan.standing
     held = None if standing is None else standing.mortar
-    network, asks = plan.engine.network, words["stability"]
+    network, asks, workers = plan.engine.network, words["stability"], words.get("workers", 1)
     prover = find_prover(network, shown, tell, asks=asks, own=held)
-    scene = plan.engine.network.scene
+    scene = network.scene
     tables = FOLDERS.plan_files(plan) if output.path is not None else {}
-    verdicts = prover.of_builds({plan.title: plan.steps})
+    verdicts = prover.of_builds({plan.title: plan.steps}, workers)
     report = partial(_report, plan, prover, tables, words)
     written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
     showing = {**prover.spent, "pictures": _pictures(tables)}
