@@ -136,6 +136,7 @@ CHECKS = {
     "speed_accuracy regret": Check(
         speed_accuracy.holds, "regret", 0.5, {"engine": "rigid grips"}, REGRET
     ),
+    "speed_accuracy own": Check(speed_accuracy.holds, "own", 9, {"status": "done"}, REGRET),
     "speed_accuracy same": Check(
         speed_accuracy.holds, "same", where=GROWN, value=False, tables=REGRET, spoiled=1
     ),
