@@ -29,7 +29,7 @@ from seqopt.contact.mortar import (
     bond_mortar,
     find_mortar,
 )
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, WorkerError
 from seqopt.network.network import GROUND, Network, build_network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step
@@ -110,8 +110,8 @@ class BuildProver:
     """Says which steps of builds stand; what was asked once is known.
 
     ``mortars``: by what they are called, that of the scene last; without any, nothing is asked;
-    ``refusal``: why no verdict is found, where bricks do not touch; else empty; ``proven``:
-    verdicts that took a proof of their own.
+    ``refusal``: why no verdict is found, as bricks do not touch or a worker died; else empty;
+    ``proven``: verdicts that took a proof of their own.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class BuildProver:
             with _keep(workers=workers):
                 for name in () if self.refusal else self.mortars:
                     self._ask(name, ordered, workers)
-        except SceneError as error:
+        except (SceneError, WorkerError) as error:
             self.refusal = str(error)
         return {
             build: tuple(self._of_build(steps, name) for name in self.mortars)
