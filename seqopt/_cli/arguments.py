@@ -109,12 +109,11 @@ def parser(asked: str | None = None, *, helps: bool = True) -> argparse.Argument
     about = "show program's version number and exit"
     whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
-    commands = whole.add_subparsers(
-        required=True, title="commands", metavar="COMMAND", dest="command"
-    )
+    subs = whole.add_subparsers(required=True, title="commands", metavar="COMMAND", dest="command")
     for name, command in (COMMANDS if asked in COMMANDS else every_command()).items():
-        added = commands.add_parser(name, help=command.line)
+        added = subs.add_parser(name, help=command.line)
         added.color = False
+        added._negative_number_matcher = re.compile(r"-\.?\d")  # -1e6 is a value, too
         if asked in (None, name):
             SIGNATURES.signature_of(command.load()).fill(added, helps=helps)
         if asked == name:

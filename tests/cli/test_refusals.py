@@ -100,7 +100,7 @@ BAD = {
     "optimize ARCH --time-limit 5min": "not a positive number or zero; give a number of s",
     "optimize ARCH --limit D_max=20": "--limit D_max=20: 20 m is more than the structure's size, ",
     "optimize ARCH --limit D_max=2in": "'2in' is not a positive number; give a number of m, or a",
-    "optimize ARCH --limit F_largest=300N": "'300N' is not a positive number; give a number of N",
+    "optimize ARCH --grips -1e6": "rob1: stiffness is -1000000.0; give one number or three",
     "optimize ARCH --robots rob1 --aim minmx": "aim 'minmx' does not exist (did you mean minmax?)",
     "scene arch25 --grips=soft": "--grips soft: 'soft' is no stiffness; give rigid, 1e6 or",
     "scene arch25 --grips=1e6,2e4": "give a stiffness, and after a comma turning=STIFFNESS",
