@@ -131,7 +131,9 @@ def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, w
         pass
 
 
-def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
+def test_what_is_interrupted_keeps_what_is_there_and_has_a_status_of_its_own():
+    answer = ended(LOOP, "proving what stands")  # of a plan
+    assert (answer.status, answer.notes[-1]) == (130, "stability: not proven; interrupted")
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     answer = ended(words, "1 plans found")
     assert answer.status == 130

@@ -112,7 +112,6 @@ BAD = {
     f"{VLR} --map friction --holds glue": "--holds glue: give epoxy, dry, or bond=",
     f"{VLR} --map friction --margins bond": "--margins: not allowed with --map; leave one",
     f"{VLR} --map friction --friction 0.3": "of them out, or give --map friction=0.3",
-    f"{VLR} --map friction --mortar dry": "--mortar: not allowed with --map; leave one of them",
     f"{VLR} --map friction --workers 2": "--workers: not allowed with --map; leave one of them",
     f"{VLR} --holds dry": "--holds dry: it goes with --map; give --map friction, say",
 }

@@ -15,13 +15,12 @@ from seqopt.stability.assessment import verdict
 from seqopt.stability.failure_map import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.verdict import Verdict
 
-FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 pytestmark = pytest.mark.xdist_group("builds")  # what all look at is made once
 
 
 @pytest.fixture(scope="module")
 def flat():
-    return seqopt.build_network(seqopt.load_scene(FLAT))
+    return seqopt.build_network(seqopt.load_scene("arch:span=2,rise=0.8,pattern=VLR"))
 
 
 @pytest.fixture(scope="module")

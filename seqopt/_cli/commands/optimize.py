@@ -35,7 +35,8 @@ TIMES = Later("seqopt.times._tables")  # where mortar cures
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
 ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
 SAMPLED = ("measure", "count", "seed", "vary")
-INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
+CUT = "interrupted"  # while it was proven what stands
+INTERRUPTED = f"seqopt: {CUT}; the plan is the best that was met"
 
 
 def run(
@@ -84,11 +85,13 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     """Write a plan, and return its answer; ``words``: that asked for it."""
     shown, standing = words.get("stands", words.get("mortar")), plan.standing
     held = None if standing is None else standing.mortar
-    network, asks, workers = plan.engine.network, words["stability"], words.get("workers", 1)
-    prover = find_prover(network, shown, tell, asks=asks, own=held)
-    scene = network.scene
+    network, scene = plan.engine.network, plan.engine.network.scene
+    prover = find_prover(network, shown, tell, asks=words["stability"], own=held)
     tables = FOLDERS.plan_files(plan) if output.path is not None else {}
-    verdicts = prover.of_builds({plan.title: plan.steps}, workers)
+    try:
+        verdicts = prover.of_builds({plan.title: plan.steps}, words.get("workers", 1))
+    except KeyboardInterrupt:  # the plan is there
+        verdicts, prover.refusal = {}, CUT
     report = partial(_report, plan, prover, tables, words)
     written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
     showing = {**prover.spent, "pictures": _pictures(tables)}
@@ -96,7 +99,8 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     def spent() -> list[str]:  # once all else is said
         return [remarks.spent_said(plan.spent, showing)] if words["details"] else []
 
-    early, over = plan.ended is End.INTERRUPTED, remarks.exceeded(scene, plan._columns)
+    early = plan.ended is End.INTERRUPTED or prover.refusal == CUT
+    over = remarks.exceeded(scene, plan._columns)
     answer = Answer(
         {
             "summary": report,
@@ -209,7 +213,5 @@ def _proof(plan: Plan) -> str:
     looked += " prove it" + f", {plan.models:,} models were searched" * bool(proof.models)
     other = "no other plan among these" if plan.graph.among else "no other plan"
     other = f"{OUTSIDE}, where {other}" if plan.is_far else other
-    better = (
-        "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
-    )
+    better = "is better" + f" by more than {100 * plan.gap:.3g} %" * (plan.gap > TOLERANCE)
     return f"{looked}; {other} {better if isfinite(plan.gap) else 'is looked at'}"
