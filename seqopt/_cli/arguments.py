@@ -73,7 +73,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser with one-line errors that prints help as a result on standard output."""
 
     color: bool  # of Python 3.14
-    asked = ""  # the command that is asked for, and its options
+    asked = ""  # the command that is asked for, after a blank, and its options
     spoken: tuple[str, ...] = ()
 
     def _get_formatter(self) -> argparse.HelpFormatter:
@@ -84,8 +84,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         hint = _nearest(message, self.spoken or tuple(self._option_string_actions))
-        where = f"{self.prog} {self.asked}".rstrip()
-        complain(f"{self.prog}: error: {message}{hint} (see {where} --help)")
+        complain(f"{self.prog}: error: {message}{hint} (see {self.prog}{self.asked} --help)")
         self.exit(Status.BAD_INPUT)
 
 
@@ -116,7 +115,7 @@ def parser(asked: str | None = None, *, helps: bool = True) -> argparse.Argument
         if asked in (None, name):
             SIGNATURES.signature_of(command.load()).fill(added, helps=helps)
         if asked == name:
-            whole.asked, whole.spoken = name, tuple(added._option_string_actions)
+            whole.asked, whole.spoken = f" {name}", tuple(added._option_string_actions)
     return whole
 
 

@@ -14,7 +14,10 @@ from seqopt.engines.registry import AutoEngine, _chooser_of
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene
-from seqopt.stability.failure_map import BuildVerdicts
+from seqopt.sequence.steps import Step
+from seqopt.stability.failure_map import BuildProver, BuildVerdicts
+
+CUT = "interrupted"  # why no verdict is known
 
 
 def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
@@ -48,6 +51,17 @@ def spent_said(
     return f"spent: {'; '.join(parts)}"
 
 
+def verdicts_of(
+    prover: BuildProver, builds: Mapping[str, Sequence[Step]], workers: int = 1
+) -> dict[str, tuple[BuildVerdicts, ...]]:
+    """Return the verdicts of builds, none after an interrupt: it ends no more than their proofs."""
+    try:
+        return prover.of_builds(builds, workers)
+    except KeyboardInterrupt:
+        prover.refusal = CUT
+        return {}
+
+
 def bonded(engine: Engine, mortar: str | None) -> Iterator[str]:
     """Yield that joints hold another mortar in an engine than the one that verdicts are of."""
     chooser = engine if isinstance(engine, AutoEngine) else _chooser_of(engine)
@@ -75,12 +89,10 @@ def marked(
     facts = {**answer.facts, "outside_linear_range": [*map(str, outside)]}
     facts |= {} if over is None else {"payloads_exceeded": [*over]}
     if verdicts is not None:
-        found = {n: {each.mortar: each.facts() for each in own} for n, own in verdicts.items()}
-        facts["stability"] = found
+        facts["stability"] = {n: {v.mortar: v.facts() for v in own} for n, own in verdicts.items()}
     facts |= {"arms_cannot": [*unreached]} if unreached else {}
-    text, notes = answer.text, (*answer.notes, *(f"arms: {each}" for each in unreached))
-    if text:
-        text = "\n".join([*map(wrapped, lines), text])
+    notes = (*answer.notes, *(f"arms: {each}" for each in unreached))
+    text = "\n".join([*map(wrapped, lines), answer.text]) if answer.text else ""
     answer = replace(answer, facts=facts, text=text, notes=notes if text else (*lines, *notes))
     if not beyond or answer.status is not Status.DONE:
         return answer

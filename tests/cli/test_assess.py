@@ -131,9 +131,10 @@ def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, w
         pass
 
 
-def test_what_is_interrupted_keeps_what_is_there_and_has_a_status_of_its_own():
-    answer = ended(LOOP, "proving what stands")  # of a plan
-    assert (answer.status, answer.notes[-1]) == (130, "stability: not proven; interrupted")
+def test_what_is_interrupted_keeps_what_is_there_and_has_a_status_of_its_own(tmp_path):
+    for words in (LOOP, ("pareto", WALL)):
+        answer = ended((*words, "--out", tmp_path / words[0]), "proving what stands")
+        assert (answer.status, "stability: not proven; interrupted" in answer.notes) == (130, True)
     words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
     answer = ended(words, "1 plans found")
     assert answer.status == 130

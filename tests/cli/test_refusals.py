@@ -94,7 +94,6 @@ BAD = {
     "optimize ARCH --rule least_grips=1": "only the free schedule has them; give --schedule free",
     "optimize ARCH --direction take-down": "it goes with --schedule free",
     "optimize ARCH --friction 0.5": "it goes with --stands",
-    # numbers and sizes
     "optimize ARCH --workers 0": "--workers 0: give a whole number from 1",
     "optimize ARCH --max-memory much": "--max-memory much: give a size, as 500MB or 2GB",
     "optimize ARCH --time-limit 5min": "not a positive number or zero; give a number of s",

@@ -35,8 +35,7 @@ TIMES = Later("seqopt.times._tables")  # where mortar cures
 TEXT = Later("seqopt.report.text")  # 40 ms, where there is a plan
 ADVICE = Later("seqopt.plan._infeasible")  # 20 ms: it needs all proofs
 SAMPLED = ("measure", "count", "seed", "vary")
-CUT = "interrupted"  # while it was proven what stands
-INTERRUPTED = f"seqopt: {CUT}; the plan is the best that was met"
+INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 
 
 def run(
@@ -74,11 +73,10 @@ def run(
     """
     output = Output(out, asked.words.get("scene"), asked.words.get("schedule"))
     output.require(*ALWAYS)
-    words = asked.words
+    words = {**asked.words, "stability": stability, "details": details}
     mortar = engine_mortar(words.get("engine"), words.get("mortar"), verdicts=stability)
     plan: Plan = asked(mortar=mortar, progress=progress)
-    more = {"stability": stability, "details": details}
-    return answered(plan, output, {**words, **more}, progress)
+    return answered(plan, output, words, progress)
 
 
 def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -> Answer:
@@ -88,29 +86,21 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     network, scene = plan.engine.network, plan.engine.network.scene
     prover = find_prover(network, shown, tell, asks=words["stability"], own=held)
     tables = FOLDERS.plan_files(plan) if output.path is not None else {}
-    try:
-        verdicts = prover.of_builds({plan.title: plan.steps}, words.get("workers", 1))
-    except KeyboardInterrupt:  # the plan is there
-        verdicts, prover.refusal = {}, CUT
+    verdicts = remarks.verdicts_of(prover, {plan.title: plan.steps}, words.get("workers", 1))
     report = partial(_report, plan, prover, tables, words)
     written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
     showing = {**prover.spent, "pictures": _pictures(tables)}
-
-    def spent() -> list[str]:  # once all else is said
-        return [remarks.spent_said(plan.spent, showing)] if words["details"] else []
-
-    early = plan.ended is End.INTERRUPTED or prover.refusal == CUT
+    early = plan.ended is End.INTERRUPTED or prover.refusal == remarks.CUT
     over = remarks.exceeded(scene, plan._columns)
+    order = {"order": plan.order} if plan.order else {}
     answer = Answer(
-        {
-            "summary": report,
-            "proof": _proof(plan),
-            **({"order": plan.order} if plan.order else {}),
-            "plan": plan.responses,
-        },
+        {"summary": report, "proof": _proof(plan), **order, "plan": plan.responses},
         "\n".join(_lines(plan, verdicts, over, output)),
         written=written,
-        notes=(*_notes(plan, words.get("engine"), words.get("mortar")), *prover.notes, *spent()),
+        notes=(
+            *(*_notes(plan, words.get("engine"), words.get("mortar")), *prover.notes),
+            *([remarks.spent_said(plan.spent, showing)] if words["details"] else []),
+        ),
         failures=(INTERRUPTED,) if early else (),
         status=Status.INTERRUPTED if early else Status.DONE,
         scene=scene,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated
 
 import pandas as pd
@@ -66,14 +67,12 @@ def run(
     front: Front = asked(schedule=schedule, mortar=own, progress=progress)
     free, stands = graph_of(front.problem), front.problem.stands
     shown, held = (mortar, None) if stands is None else (None, stands.mortar)
-    provers = {
-        each: find_prover(each.network, shown, progress, asks=stability, own=held)
-        for each in {*front.engines}
-    }
+    made = partial(find_prover, mortar=shown, progress=progress, asks=stability, own=held)
+    provers = {each: made(each.network) for each in {*front.engines}}
     tables, left = _responses(front)
 
     def files() -> dict[str, bytes | str]:
-        every = (provers[own].of_builds(builds) for own, builds in _by_engine(front).items())
+        every = (remarks.verdicts_of(provers[own], b) for own, b in _by_engine(front).items())
         verdicts = {name: each for own in every for name, each in own.items()}
         return front_files(front, tables, left, verdicts, str(schedule), showing())
 
@@ -89,7 +88,7 @@ def run(
         *(figure_notes() if written else ()),
         *([remarks.spent_said(front_spent(front), showing())] if details else []),
     )
-    early = front.stopped == INTERRUPT
+    early = front.stopped == INTERRUPT or remarks.CUT in {p.refusal for p in provers.values()}
     points = "" if written else f"{numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     count, whole = len(front.steps), "complete" if front.complete else "not complete"
     answer = Answer(
