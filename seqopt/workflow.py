@@ -74,8 +74,8 @@ class Search:
         Seconds that posing, choosing and proof may take; the best choice by then has a lower bound;
         without proof, where choosing and computing are one, the moves that were chosen by then.
     workers : int, optional
-        Processes to share the work among; up to 338 bricks two search as long as one; the
-        command proves what stands of large plans in 0.7 of its time (default: 1).
+        Processes to share the work among; up to 338 bricks two search as long as one; what
+        stands of large plans commands prove in 0.7 of the time (default: 1).
     executor : concurrent.futures.Executor, optional
         Who does the work in place of workers, as ``client.get_executor()`` of dask.
     cache : str or pathlib.Path, optional

@@ -105,7 +105,8 @@ def parser(asked: str | None = None, *, helps: bool = True) -> argparse.Argument
         description="Where should each robot hold a half-built structure, over the whole build?",
         epilog="seqopt COMMAND --help has the options of a command by question, and examples.",
     )
-    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help="the version")
+    about = "show program's version number and exit"
+    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
     subs = whole.add_subparsers(required=True, title="commands", metavar="COMMAND", dest="command")
     for name, command in (COMMANDS if asked in COMMANDS else every_command()).items():

@@ -52,11 +52,11 @@ def spent_said(
 
 
 def verdicts_of(
-    prover: BuildProver, builds: Mapping[str, Sequence[Step]], workers: int = 1
+    prover: BuildProver, builds: Mapping[str, Sequence[Step]], words: Mapping[str, Any]
 ) -> dict[str, tuple[BuildVerdicts, ...]]:
     """Return the verdicts of builds, none after an interrupt: it ends no more than their proofs."""
     try:
-        return prover.of_builds(builds, workers)
+        return prover.of_builds(builds, words.get("workers", 1))
     except KeyboardInterrupt:
         prover.refusal = CUT
         return {}

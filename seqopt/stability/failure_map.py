@@ -110,7 +110,7 @@ class BuildProver:
     """Says which steps of builds stand; what was asked once is known.
 
     ``mortars``: by what they are called, that of the scene last; without any, nothing is asked;
-    ``refusal``: why no verdict is found, as bricks do not touch or a worker died; else empty;
+    ``refusal``: why no verdict is found, as bricks do not touch or it was interrupted; else empty;
     ``proven``: verdicts that took a proof of their own.
     """
 
@@ -139,10 +139,7 @@ class BuildProver:
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]], workers: int = 1
     ) -> dict[str, tuple[BuildVerdicts, ...]]:
-        """Return the verdicts of builds by their steps, one for every mortar.
-
-        ``workers``: processes that share large builds.
-        """
+        """Return the verdicts of builds, one for every mortar; ``workers`` share large builds."""
         distinct = {_state(step): step for steps in builds.values() for step in steps}
         # one that fewer hold comes before others, which its forces prove
         ordered = sorted(distinct.values(), key=lambda step: (step.bricks, len(step.held)))
@@ -151,7 +148,9 @@ class BuildProver:
             with _keep(workers=workers):
                 for name in () if self.refusal else self.mortars:
                     self._ask(name, ordered, workers)
-        except (SceneError, WorkerError) as error:
+        except WorkerError:  # this process proves what is left
+            return self.of_builds(builds)
+        except SceneError as error:
             self.refusal = str(error)
         return {
             build: tuple(self._of_build(steps, name) for name in self.mortars)

@@ -86,12 +86,11 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
     network, scene = plan.engine.network, plan.engine.network.scene
     prover = find_prover(network, shown, tell, asks=words["stability"], own=held)
     tables = FOLDERS.plan_files(plan) if output.path is not None else {}
-    verdicts = remarks.verdicts_of(prover, {plan.title: plan.steps}, words.get("workers", 1))
+    verdicts = remarks.verdicts_of(prover, {plan.title: plan.steps}, words)
     report = partial(_report, plan, prover, tables, words)
     written = output.write(tell, lambda: FOLDERS.plan_pages(plan, prover, report) | tables)
     showing = {**prover.spent, "pictures": _pictures(tables)}
-    early = plan.ended is End.INTERRUPTED or prover.refusal == remarks.CUT
-    over = remarks.exceeded(scene, plan._columns)
+    early, over = plan.ended is End.INTERRUPTED, remarks.exceeded(scene, plan._columns)
     order = {"order": plan.order} if plan.order else {}
     answer = Answer(
         {"summary": report, "proof": _proof(plan), **order, "plan": plan.responses},
@@ -102,7 +101,7 @@ def answered(plan: Plan, output: Output, words: Mapping[str, Any], tell: Tell) -
             *([remarks.spent_said(plan.spent, showing)] if words["details"] else []),
         ),
         failures=(INTERRUPTED,) if early else (),
-        status=Status.INTERRUPTED if early else Status.DONE,
+        status=Status.INTERRUPTED if early or prover.refusal == remarks.CUT else Status.DONE,
         scene=scene,
     )
     unreached = () if plan.arms is None else plan.arms.faults

@@ -72,7 +72,7 @@ def run(
     tables, left = _responses(front)
 
     def files() -> dict[str, bytes | str]:
-        every = (remarks.verdicts_of(provers[own], b) for own, b in _by_engine(front).items())
+        every = (remarks.verdicts_of(provers[o], b, words) for o, b in _by_engine(front).items())
         verdicts = {name: each for own in every for name, each in own.items()}
         return front_files(front, tables, left, verdicts, str(schedule), showing())
 
